@@ -1,0 +1,82 @@
+# "make" shows the targets. VENV holds Python packages only and can be deleted at any time.
+
+VENV := .venv
+BIN := $(VENV)/bin
+ARGS ?=
+
+# With ROS sourced, its rclpy is used; otherwise the extra "jazzy" brings the client library.
+ROS := $(if $(ROS_DISTRO),$(shell python3 -c 'import rclpy' 2>/dev/null && echo $(ROS_DISTRO)))
+
+IS_SUITABLE := import ensurepip, sys, venv; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))
+CANDIDATES := $(if $(ROS),python3,python3 python3.12 python3.11 python3.13 python3.10)
+
+# What mypy finds depends on the types that NumPy brings; the code is checked with those of 2.4 and 2.5.
+HAS_TYPES := import numpy, sys; sys.exit(numpy.__version__[:4] not in ("2.4.", "2.5."))
+
+# pytest may be the system's, without a script in VENV; "-m" would put the checkout on the path.
+PYTEST := import sys; sys.path[:] = filter(None, sys.path); import pytest; sys.exit(pytest.main())
+
+# VENV belongs to one Python and one kind of ROS; another one makes it anew.
+MADE := $(VENV)/made-for-$(if $(PYTHON),$(subst /,_,$(PYTHON))-)$(or $(ROS),wheels)
+DEPENDENCIES := $(VENV)/dependencies-installed
+PACKAGE := $(VENV)/package-installed
+SOURCES := $(shell find flat_planner_ros config launch resource -type f -not -name '*.pyc' | sort)
+
+export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_PREFIX_PATH))
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help demo test lint install clean FORCE
+.DELETE_ON_ERROR:
+
+help:  ## show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@echo 'ARGS="..." is added to the command line of demo and test; PYTHON=... chooses the interpreter.'
+
+demo: install  ## the paper's experiment on the three nodes: table, figures and numbers in build/
+	@mkdir -p build
+	$(BIN)/paper_table --plot build/paper_figures.png --csv build/paper_table.csv $(ARGS)
+
+test: export REQUIRE_ROS := 1
+test: export ROS_PYTHON_CHECK_FIELDS := 1
+test: lint  ## ruff, mypy and all tests
+	$(BIN)/python -c '$(PYTEST)' --timeout=120 $(ARGS)
+
+lint: install  ## ruff and mypy only
+	$(BIN)/python -m ruff check
+	$(BIN)/python -m ruff format --check
+	@if $(BIN)/python -c '$(HAS_TYPES)'; then set -x; $(BIN)/python -m mypy; \
+	else echo 'mypy is left out: it is run with the types of NumPy 2.4 and 2.5 only'; fi
+
+install: $(PACKAGE)  ## the package as it stands here, with all it needs, into .venv
+
+clean:  ## remove .venv, build and the caches
+	rm -rf $(VENV) build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+$(MADE):
+	@python=; for p in $(or $(PYTHON),$(CANDIDATES)); do \
+	  if $$p -c '$(IS_SUITABLE)' 2>/dev/null; then python=$$p; break; fi; done; \
+	if [ -z "$$python" ]; then \
+	  echo 'No suitable Python among: $(or $(PYTHON),$(CANDIDATES)). Install Python 3.10 to 3.13' \
+	    'with venv (Debian, Ubuntu: apt install python3-venv), or name one: make PYTHON=...' >&2; \
+	  exit 1; fi; \
+	echo "making .venv (about a minute) with $$($$python --version) and $(if $(ROS),ROS $(ROS),the wheels of ROS jazzy)"; \
+	$$python -m venv --clear $(if $(ROS),--system-site-packages) $(VENV)
+	@touch $@
+
+# The compiled messages of a ROS installation need the NumPy that they were built with.
+$(DEPENDENCIES): setup.py pyproject.toml $(MADE)
+	$(BIN)/python -m pip install --quiet --progress-bar off 'setuptools>=70.1,<80' \
+	  $(if $(ROS),"numpy==$$(python3 -c 'import numpy; print(numpy.__version__)')") \
+	  '.[$(if $(ROS),,jazzy,)plot,test]'
+	@touch $@
+
+# A removed source changes no time stamp, hence the list; and it would live on in build/lib.
+$(PACKAGE): $(DEPENDENCIES) $(VENV)/sources package.xml setup.cfg $(SOURCES)
+	@rm -rf build/lib build/bdist.* *.egg-info
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --force-reinstall .
+	@rm -rf build/lib build/bdist.* *.egg-info
+	@touch $@
+
+$(VENV)/sources: FORCE $(DEPENDENCIES)
+	@echo '$(SOURCES)' | cmp -s - $@ || echo '$(SOURCES)' > $@

@@ -1,0 +1,1 @@
+"""Optimal flat motion planning for planar arms with an elastic last joint."""

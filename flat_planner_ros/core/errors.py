@@ -1,0 +1,62 @@
+"""What the core refuses, and with which numbers."""
+
+
+class FlatPlannerError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class InvalidModel(FlatPlannerError):
+    """The arm's data are not those of a physical arm."""
+
+
+class NotFlat(InvalidModel):
+    """
+    The arm is not differentially flat: a centre of mass is off its joint axis.
+
+    Attributes
+    ----------
+    link
+        Number of the offending link, counted from 1.
+    static_moment
+        Its remaining first moment of mass about its joint axis [kg m].
+
+    """
+
+    def __init__(self, link: int, static_moment: float, message: str) -> None:
+        """Keep the link and its unbalance, so that a caller can mend it."""
+        super().__init__(message)
+        self.link = link
+        self.static_moment = static_moment
+
+
+class InvalidCost(FlatPlannerError):
+    """The cost matrix or a weight defines no convex planning problem."""
+
+
+class InvalidRequest(FlatPlannerError):
+    """The motion asked for has no meaning (not finite, no duration)."""
+
+
+class UncertifiedPlan(FlatPlannerError):
+    """
+    A computed motion law misses the accuracy that a plan promises.
+
+    Attributes
+    ----------
+    quantity
+        What was checked.
+    residual, tolerance
+        What was found and what is allowed [-].
+
+    """
+
+    def __init__(self, quantity: str, residual: float, tolerance: float) -> None:
+        """Keep both numbers, so that a caller can report them."""
+        super().__init__(f'{quantity} {residual:.2e} exceeds {tolerance:.0e}')
+        self.quantity = quantity
+        self.residual = residual
+        self.tolerance = tolerance
+
+
+class InvalidCommand(FlatPlannerError):
+    """The commanded trajectory cannot be played."""

@@ -1,0 +1,192 @@
+"""
+Search for the frequency and decay that fit best, on samples scaled to unit time and size.
+
+The signal is linear in bias, slope and the two phases of the oscillation, so only the two rates
+(w, s) of exp(-s u) cos(w u) are searched and the linear unknowns are eliminated (variable
+projection).
+"""
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import next_fast_len, rfft
+from scipy.optimize import least_squares
+
+Array = NDArray[np.float64]
+
+ROUNDOFF = 4.0 * float(np.finfo(float).eps)
+"""Size of rounding errors relative to the largest value [-]."""
+
+SEARCH_PERIODS = 0.5
+"""Lowest frequency searched, so that slower signals are seen to be slower [periods]."""
+
+GROWTH_LIMIT = 2.0
+"""Largest growth allowed to a fit, as exponent over the samples [-]."""
+
+DAMPING_LIMIT = 2.0
+"""Largest decay over damped angular frequency of a fit, damping ratio 0.89 [-]."""
+
+NYQUIST_SHARE = 0.95
+"""Highest frequency of a fit relative to half the median sampling rate [-]."""
+
+SLOW_PERIODS = np.arange(SEARCH_PERIODS, 8.0, 0.25)
+"""Frequencies tried with bias and drift in the fit [periods in the samples]."""
+
+SLOW_DAMPING = (0.0, 0.05, 0.15, 0.4)
+"""Decays tried with them, relative to the angular frequency [-]."""
+
+FAST_DAMPING = (0.0, 0.01, 0.05, 0.2)
+"""Decays tried at the peaks of the spectrum, relative to the angular frequency [-]."""
+
+LONG_DECAYS = (1.0, 3.0, 10.0)
+"""Decays tried at the peaks besides, over the samples, which long records need [-]."""
+
+COARSE_SAMPLES = 256
+"""Number of averaged samples on which the slow frequencies are tried [-]."""
+
+SPECTRUM_SAMPLES = 2**15
+"""Most samples of the resampled signal behind the spectrum [-]."""
+
+SPECTRUM_PADDING = 4
+"""Zero padding of the spectrum relative to the signal's length [-]."""
+
+CANDIDATES = 3
+"""Number of starting points taken from each search, and refined at the end [-]."""
+
+FIT_TOLERANCE = 1e-13
+"""Relative change of cost and unknowns at which the fit ends [-]."""
+
+MAX_EVALUATIONS = 60
+"""Most evaluations of one refinement [-]."""
+
+
+def basis_columns(u: Array, rates: ArrayLike) -> Array:
+    """Return the linear unknowns' columns for rates (w, s) per unit of u: (..., m, 4)."""
+    w, s = np.moveaxis(np.asarray(rates, dtype=float), -1, 0)[..., None]
+    phase = w * u
+    envelope = np.exp(-s * u)
+    line = np.broadcast_to(u - 0.5, phase.shape)
+    columns = (np.ones_like(phase), line, envelope * np.cos(phase), envelope * np.sin(phase))
+    return np.stack(columns, axis=-1)
+
+
+def rate_columns(u: Array, basis: Array, linear: Array) -> Array:
+    """Return the derivatives of the fitted signal with respect to (w, s): (m, 2)."""
+    cosine, sine = basis[:, 2], basis[:, 3]
+    a, b = linear[2], linear[3]
+    return np.stack((u * (b * cosine - a * sine), -u * (a * cosine + b * sine)), axis=-1)
+
+
+def solve_linear(basis: Array, y: Array) -> tuple[Array, Array]:
+    """Return the orthonormal columns (m, 4) and the linear unknowns (4,) of least squares."""
+    q, r = np.linalg.qr(basis)
+    # A decay within one long gap leaves an empty column: any finite unknown will do for it.
+    np.fill_diagonal(r, np.where(np.abs(np.diagonal(r)) < ROUNDOFF, 1.0, np.diagonal(r)))
+    return q, np.linalg.solve(r, q.T @ y)
+
+
+def _misfit(u: Array, y: Array, rates: Array) -> Array:
+    """Return the sum of squares that the best linear unknowns leave, rates (c, 2) -> (c,)."""
+    basis = basis_columns(u, rates)  # (c, m, 4)
+    transposed = np.swapaxes(basis, -1, -2)
+    moments = transposed @ y  # (c, 4)
+    # A trace of ridge: near the Nyquist frequency columns can coincide.
+    gram = transposed @ basis + ROUNDOFF * y.size * np.eye(4)
+    linear = np.linalg.solve(gram, moments[..., None])[..., 0]
+    misfit: Array = y @ y - np.einsum('ci,ci->c', moments, linear)
+    return misfit
+
+
+def _grid(w: Array, decays: tuple[float, ...], power: float = 1.0) -> Array:
+    """Return all pairs (w, decay w^power), shape (len(w) len(decays), 2)."""
+    return np.stack((np.repeat(w, len(decays)), np.outer(w**power, decays).ravel()), axis=-1)
+
+
+def _best(u: Array, y: Array, rates: Array) -> Array:
+    """Return the few best rates with different w, best first, shape (<= CANDIDATES, 2)."""
+    ranked = rates[np.argsort(_misfit(u, y, rates))]
+    _, first = np.unique(ranked[:, 0], return_index=True)
+    return ranked[np.sort(first)[:CANDIDATES]]
+
+
+def _slow_starts(u: Array, y: Array) -> Array:
+    """Return starts with few periods, where bias and drift hide the spectral peak: (c, 2)."""
+    block = -(-u.size // COARSE_SAMPLES)
+    whole = u.size - u.size % block
+    coarse_u, coarse_y = (x[:whole].reshape(-1, block).mean(axis=1) for x in (u, y))
+    return _best(coarse_u, coarse_y, _grid(2 * pi * SLOW_PERIODS, SLOW_DAMPING))
+
+
+def _fast_starts(u: Array, y: Array) -> Array:
+    """Return starts at the highest peaks of the resampled signal's spectrum: (c, 2)."""
+    count = int(min(round(1.0 / float(np.median(np.diff(u)))) + 1, SPECTRUM_SAMPLES))
+    grid = np.linspace(0.0, 1.0, count)
+    signal = np.interp(grid, u, y)
+    signal = signal - np.polyval(np.polyfit(grid, signal, 1), grid)
+    length = next_fast_len(SPECTRUM_PADDING * count, real=True)
+    power = np.abs(rfft(signal, length))
+    peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
+    peaks = peaks[np.argsort(-power[peaks])][:CANDIDATES]
+    w = 2 * pi * peaks * (count - 1) / length
+    return np.concatenate((_grid(w, FAST_DAMPING), _grid(w, LONG_DECAYS, 0.0)))
+
+
+def best_rates(u: Array, y: Array) -> Array:
+    """
+    Return the rates of the oscillation that fits best beside a straight line.
+
+    Parameters
+    ----------
+    u
+        Times scaled to 0 ... 1 [-], ascending, shape (m,).
+    y
+        Values of the order of one [-], shape (m,).
+
+    Returns
+    -------
+    Array
+        Angular frequency and decay (w, s) per unit of u [-], shape (2,).
+
+    """
+    highest = max(NYQUIST_SHARE * pi / float(np.median(np.diff(u))), 2 * pi)
+    lower = np.array((2 * pi * SEARCH_PERIODS, -GROWTH_LIMIT))
+    upper = np.array((highest, DAMPING_LIMIT * highest))
+    starts = np.concatenate((_slow_starts(u, y), _fast_starts(u, y)))
+    starts = np.clip(starts, lower, upper)
+    results = [_descend(u, y, start, lower, upper) for start in _best(u, y, starts)]
+    best = min(results, key=lambda result: float(result.cost))
+    return np.asarray(best.x, dtype=float)
+
+
+def _descend(u: Array, y: Array, start: Array, lower: Array, upper: Array) -> Any:
+    """Return scipy's result of the separable least-squares problem from one start."""
+    residual, jacobian = _separable(u, y)
+    return least_squares(
+        residual,
+        start,
+        jac=jacobian,
+        bounds=(lower, upper),
+        ftol=FIT_TOLERANCE,
+        xtol=FIT_TOLERANCE,
+        gtol=None,
+        max_nfev=MAX_EVALUATIONS,
+    )
+
+
+def _separable(u: Array, y: Array) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+    """Return residual (m,) and Kaufman's Jacobian (m, 2) as functions of the rates."""
+
+    def residual(rates: Array) -> Array:
+        q, _ = solve_linear(basis_columns(u, rates), y)
+        return y - q @ (q.T @ y)
+
+    def jacobian(rates: Array) -> Array:
+        basis = basis_columns(u, rates)
+        q, linear = solve_linear(basis, y)
+        slopes = rate_columns(u, basis, linear)
+        return q @ (q.T @ slopes) - slopes
+
+    return residual, jacobian

@@ -1,0 +1,502 @@
+"""
+True dynamics of an arm under a stamped effort command.
+
+Nothing here knows of flatness or planning, so that the simulated arm can prove a plan wrong.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import floor, inf
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.errors import InvalidCommand, InvalidModel
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline, PPoly
+
+Array = npt.NDArray[np.float64]
+
+GRID_TOLERANCE = 1e-6
+"""A grid time ahead of the present by less counts as reached, relative to the step [-]."""
+
+
+class JointReference(NamedTuple):
+    """
+    What a command asks of the actuated joints at one time.
+
+    Attributes
+    ----------
+    effort, position, velocity
+        Shape (n-1,) [N m], [rad], [rad/s]; position and velocity NaN where none are commanded.
+
+    """
+
+    effort: Array
+    position: Array
+    velocity: Array
+
+
+class ArmState(NamedTuple):
+    """
+    An arm's motion at one time.
+
+    Attributes
+    ----------
+    time
+        Simulated time [s].
+    position, velocity
+        Joint angles [rad] and velocities [rad/s], shape (n,).
+    effort
+        Effort applied at each joint, spring and damper at the passive one, shape (n,) [N m].
+
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    effort: Array
+
+
+class Rollout(NamedTuple):
+    """
+    States on a time grid.
+
+    Attributes
+    ----------
+    times
+        Shape (m,) [s].
+    positions, velocities
+        Shape (m, n) [rad], [rad/s].
+
+    """
+
+    times: Array
+    positions: Array
+    velocities: Array
+
+
+class _Course(NamedTuple):
+    """Efforts that are linear in time between knots; times from the command's start [s]."""
+
+    times: list[float]
+    efforts: Array
+    slopes: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EffortProfile:
+    """
+    A stamped effort command, played by time like joint_trajectory_controller does.
+
+    Efforts are linear between the points. The last point is held after the end. Before the first
+    point the effort goes linearly from the anchor to it; nothing is applied before the start when
+    there is no anchor.
+
+    Attributes
+    ----------
+    start
+        Absolute time of the command's stamp [s].
+    times
+        Times of the points from the start, increasing, shape (m,) [s].
+    efforts
+        Efforts of the actuated joints, exactly zero at the end, shape (m, n-1) [N m].
+    positions, velocities
+        References for feedback, shape (m, n-1) [rad], [rad/s]; both or only positions or none.
+    anchor_time, anchor_effort
+        Time at which the command was taken over [s] and the effort then, shape (n-1,) [N m].
+
+    """
+
+    start: float
+    times: Array
+    efforts: Array
+    positions: Array | None = None
+    velocities: Array | None = None
+    anchor_time: float | None = None
+    anchor_effort: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be played and lock the arrays."""
+        start = float(self.start)
+        if not np.isfinite(start):
+            raise InvalidCommand(f'start must be finite, got {start} s')
+        times = _locked('times', self.times, 's')
+        if times.ndim != 1 or times.size < 1:
+            raise InvalidCommand(f'times must be (m,) with m >= 1, got shape {times.shape}')
+        if times[0] < 0.0:
+            raise InvalidCommand(f'times must not be negative, got {times[0]:g} s')
+        if (np.diff(times) <= 0.0).any():
+            i = int(np.argmax(np.diff(times) <= 0.0))
+            raise InvalidCommand(
+                f'times must increase, got {times[i]:.9g} s then {times[i + 1]:.9g} s'
+            )
+        efforts = _locked('efforts', self.efforts, 'N m')
+        if efforts.ndim != 2 or efforts.shape[0] != times.size or efforts.shape[1] < 1:
+            raise InvalidCommand(
+                f'efforts must be ({times.size}, n-1) with n >= 2, got shape {efforts.shape}'
+            )
+        if efforts[-1].any():
+            raise InvalidCommand(f'the last effort must be 0 N m, got {efforts[-1]}')
+        if self.velocities is not None and self.positions is None:
+            raise InvalidCommand('velocities need positions')
+        if (self.anchor_time is None) != (self.anchor_effort is None):
+            raise InvalidCommand('anchor_time and anchor_effort go together')
+        for name, value in {'start': start, 'times': times, 'efforts': efforts}.items():
+            object.__setattr__(self, name, value)
+        self._lock_optional('positions', self.positions, efforts.shape, 'rad')
+        self._lock_optional('velocities', self.velocities, efforts.shape, 'rad/s')
+        self._lock_optional('anchor_time', self.anchor_time, (), 's')
+        self._lock_optional('anchor_effort', self.anchor_effort, efforts.shape[1:], 'N m')
+
+    @property
+    def end(self) -> float:
+        """Return the absolute time of the last point [s]."""
+        return self.start + float(self.times[-1])
+
+    @property
+    def motors(self) -> int:
+        """Return the number n-1 of actuated joints."""
+        return int(self.efforts.shape[1])
+
+    def taken_over(self, at: float, effort: npt.ArrayLike) -> 'EffortProfile':
+        """Return a copy that starts from an effort (n-1,) [N m] applied at a time [s]."""
+        return replace(self, anchor_time=at, anchor_effort=np.asarray(effort, dtype=float))
+
+    def effort(self, t: float) -> Array:
+        """Return the effort at an absolute time [s], shape (n-1,) [N m]."""
+        course, elapsed = self._course, t - self.start
+        i = bisect_right(course.times, elapsed) - 1
+        if i < 0:
+            return self._before
+        effort: Array = course.efforts[i] + course.slopes[i] * (elapsed - course.times[i])
+        return effort
+
+    def reference(self, t: float) -> JointReference:
+        """
+        Return effort, position and velocity at an absolute time [s].
+
+        The first position is held before the first point, the last one after the end. Positions
+        without velocities are joined linearly.
+        """
+        effort = self.effort(t)
+        if self._motion is None:
+            missing = np.full(self.motors, np.nan)
+            return JointReference(effort, missing, missing)
+        elapsed = t - self.start
+        first, last = float(self.times[0]), float(self.times[-1])
+        position = self._motion(min(max(elapsed, first), last))
+        moving = first <= elapsed < last
+        velocity = self._motion(elapsed, 1) if moving else np.zeros(self.motors)
+        return JointReference(effort, position, velocity)
+
+    def _lock_optional(
+        self, name: str, value: npt.ArrayLike | None, shape: tuple[int, ...], unit: str
+    ) -> None:
+        """Lock a field that may be missing."""
+        if value is None:
+            return
+        array = _locked(name, value, unit)
+        if array.shape != shape:
+            raise InvalidCommand(f'{name} must have shape {shape}, got {array.shape}')
+        object.__setattr__(self, name, array if shape else float(array))
+
+    @cached_property
+    def _before(self) -> Array:
+        """Effort before the first knot."""
+        return np.zeros(self.motors) if self.anchor_effort is None else self.anchor_effort
+
+    @cached_property
+    def _course(self) -> _Course:
+        """Knots of the effort, the anchor among them if it precedes the first point."""
+        times, efforts = self.times, self.efforts
+        anchor = 0.0 if self.anchor_time is None else self.anchor_time - self.start
+        if anchor < times[0]:
+            times, efforts = np.append(anchor, times), np.vstack((self._before, efforts))
+        slopes = np.diff(efforts, axis=0) / np.diff(times)[:, None]
+        return _Course(times.tolist(), efforts, np.vstack((slopes, np.zeros(self.motors))))
+
+    @cached_property
+    def _motion(self) -> PPoly | None:
+        """Position as a piecewise polynomial of the time from the start."""
+        if self.positions is None:
+            return None
+        if self.times.size == 1:
+            return PPoly(self.positions[None], self.times[0] + np.array([0.0, 1.0]))
+        if self.velocities is not None:
+            return CubicHermiteSpline(self.times, self.positions, self.velocities)
+        slopes = np.diff(self.positions, axis=0) / np.diff(self.times)[:, None]
+        return PPoly(np.stack((slopes, self.positions[:-1])), self.times)
+
+
+class SimulatedArm:
+    """
+    The true arm: its full dynamics, integrated in fixed Runge-Kutta steps of fourth order.
+
+    Time lies on a grid: the start plus a whole number of steps, so that it never drifts.
+
+    Parameters
+    ----------
+    arm
+        The arm as it is, not as a planner believes it to be.
+    position
+        Joint angles at rest, shape (n,) [rad]; zeros by default.
+    time
+        Time at the start [s].
+    step
+        Integration step [s].
+    saturation
+        Largest effort of each motor, shape (n-1,) [N m]; unlimited by default.
+    feedback_p, feedback_d
+        Gains on position and velocity errors of the actuated joints, shape (n-1,) [N m/rad],
+        [N m s/rad]; zeros by default. They act while a command is there.
+
+    Raises
+    ------
+    InvalidModel
+        If a number has no meaning.
+
+    """
+
+    def __init__(
+        self,
+        arm: PlanarArm,
+        *,
+        position: npt.ArrayLike | None = None,
+        time: float = 0.0,
+        step: float = 1e-3,
+        saturation: npt.ArrayLike | None = None,
+        feedback_p: npt.ArrayLike | None = None,
+        feedback_d: npt.ArrayLike | None = None,
+    ) -> None:
+        """Stand still at the position."""
+        if not (np.isfinite(step) and step > 0.0):
+            raise InvalidModel(f'step must be finite and above 0 s, got {step}')
+        if not np.isfinite(time):
+            raise InvalidModel(f'time must be finite, got {time} s')
+        self._arm = arm
+        self._origin, self._step, self._count = float(time), float(step), 0
+        self._saturation = self._motor_option('saturation', saturation, inf, 'N m')
+        self._feedback_p = self._motor_option('feedback_p', feedback_p, 0.0, 'N m/rad')
+        self._feedback_d = self._motor_option('feedback_d', feedback_d, 0.0, 'N m s/rad')
+        self._is_limited = bool(np.isfinite(self._saturation).any())
+        self._has_feedback = bool(self._feedback_p.any() or self._feedback_d.any())
+        self._missing = np.full(arm.n - 1, np.nan)
+        self._clipped_steps, self._is_clipped = 0, False
+        self._profile: EffortProfile | None = None
+        self._held: Array = np.zeros(arm.n - 1)
+        self.reset(np.zeros(arm.n) if position is None else position)
+
+    @property
+    def arm(self) -> PlanarArm:
+        """Return the arm; another with as many joints may take its place between steps."""
+        return self._arm
+
+    @arm.setter
+    def arm(self, arm: PlanarArm) -> None:
+        if arm.n != self._arm.n:
+            raise InvalidModel(f'the arm must keep {self._arm.n} joints, got {arm.n}')
+        self._arm = arm
+
+    @property
+    def step(self) -> float:
+        """Return the integration step [s]."""
+        return self._step
+
+    @property
+    def time(self) -> float:
+        """Return the simulated time [s]."""
+        return self._origin + self._count * self._step
+
+    @property
+    def position(self) -> Array:
+        """Return a copy of the joint angles, shape (n,) [rad]."""
+        return self._position.copy()
+
+    @property
+    def velocity(self) -> Array:
+        """Return a copy of the joint velocities, shape (n,) [rad/s]."""
+        return self._velocity.copy()
+
+    @property
+    def applied_effort(self) -> Array:
+        """Return what acts now: motors after feedback and limit, then the spring (n,) [N m]."""
+        asked = self._asked(self._reference(self.time), self._position, self._velocity)
+        passive = self._arm.passive_effort(self._position[-1], self._velocity[-1])
+        return np.append(self._clip(asked), passive)
+
+    @property
+    def state(self) -> ArmState:
+        """Return time, position, velocity and applied effort."""
+        return ArmState(self.time, self.position, self.velocity, self.applied_effort)
+
+    def take_clipped_steps(self) -> int:
+        """Return how many steps had an effort clipped since this was last asked."""
+        count, self._clipped_steps = self._clipped_steps, 0
+        return count
+
+    def command(self, profile: EffortProfile, now: float) -> None:
+        """
+        Play a profile in the place of the present command.
+
+        Parameters
+        ----------
+        profile
+            The command; past points are skipped, and a start in the future is approached linearly
+            from the effort that is commanded now.
+        now
+            Absolute time at which it was received [s].
+
+        Raises
+        ------
+        InvalidCommand
+            If it has ended already or does not suit the arm. The present command then goes on.
+
+        """
+        motors = self._arm.n - 1
+        if profile.motors != motors:
+            raise InvalidCommand(f'the arm has {motors} motors, the command {profile.motors}')
+        if profile.end <= self.time:
+            raise InvalidCommand(
+                f'the command ended at {profile.end:.6f} s, before the present {self.time:.6f} s'
+            )
+        if self._has_feedback and profile.positions is None:
+            raise InvalidCommand('feedback needs a command with positions')
+        self._profile = profile.taken_over(now, self._reference(now).effort)
+
+    def hold(self, effort: npt.ArrayLike) -> None:
+        """Apply a constant effort, shape (n-1,) [N m], until the next command, open loop."""
+        held = _locked('effort', effort, 'N m')
+        if held.shape != (self._arm.n - 1,):
+            raise InvalidCommand(f'effort must have {self._arm.n - 1} entries, got {held.shape}')
+        self._profile, self._held = None, held
+
+    def reset(self, position: npt.ArrayLike) -> None:
+        """Rest at joint angles (n,) [rad] without a command; time goes on."""
+        angles = np.array(position, dtype=float)
+        if angles.shape != (self._arm.n,) or not np.isfinite(angles).all():
+            raise InvalidModel(f'position must be {self._arm.n} finite rad, got {angles}')
+        self._position, self._velocity = angles, np.zeros(self._arm.n)
+        self._profile, self._held = None, np.zeros(self._arm.n - 1)
+
+    def advance(self, until: float) -> int:
+        """Integrate to the last grid time that is not after `until` [s]; return the steps."""
+        target = floor((until - self._origin) / self._step + GRID_TOLERANCE)
+        steps = max(0, target - self._count)
+        reference = self._reference(self.time)
+        for _ in range(steps):
+            reference = self._advance_once(reference)
+        return steps
+
+    def _advance_once(self, start: JointReference) -> JointReference:
+        """Take one step; return the reference at its end, where the next step starts."""
+        h, q, dq = self._step, self._position, self._velocity
+        middle = self._reference(self._origin + (self._count + 0.5) * h)
+        self._count += 1
+        end = self._reference(self.time)
+        self._is_clipped = False
+        ddq_1 = self._acceleration(start, q, dq)
+        dq_2 = dq + h / 2 * ddq_1
+        ddq_2 = self._acceleration(middle, q + h / 2 * dq, dq_2)
+        dq_3 = dq + h / 2 * ddq_2
+        ddq_3 = self._acceleration(middle, q + h / 2 * dq_2, dq_3)
+        ddq_4 = self._acceleration(end, q + h * dq_3, dq + h * ddq_3)
+        inner = ddq_2 + ddq_3
+        self._position = q + h * (dq + h / 6 * (ddq_1 + inner))
+        self._velocity = dq + h / 6 * (ddq_1 + 2 * inner + ddq_4)
+        self._clipped_steps += self._is_clipped
+        return end
+
+    def _acceleration(self, reference: JointReference, q: Array, dq: Array) -> Array:
+        """Return joint accelerations, shape (n,) [rad/s^2]."""
+        effort = self._asked(reference, q, dq)
+        if self._is_limited:
+            asked, effort = effort, self._clip(effort)
+            self._is_clipped = self._is_clipped or bool((asked != effort).any())
+        return self._arm.forward_dynamics(q, dq, effort)
+
+    def _reference(self, t: float) -> JointReference:
+        """Return what is commanded at an absolute time [s]."""
+        if self._profile is None:
+            return JointReference(self._held, self._missing, self._missing)
+        if self._has_feedback:
+            return self._profile.reference(t)
+        return JointReference(self._profile.effort(t), self._missing, self._missing)
+
+    def _asked(self, reference: JointReference, q: Array, dq: Array) -> Array:
+        """Return feed-forward and feedback, shape (n-1,) [N m]."""
+        if not self._has_feedback or self._profile is None:
+            return reference.effort
+        return (
+            reference.effort
+            + self._feedback_p * (reference.position - q[:-1])
+            + self._feedback_d * (reference.velocity - dq[:-1])
+        )
+
+    def _clip(self, effort: Array) -> Array:
+        """Return what the motors can give, shape (n-1,) [N m]."""
+        return np.minimum(np.maximum(effort, -self._saturation), self._saturation)
+
+    def _motor_option(
+        self, name: str, value: npt.ArrayLike | None, default: float, unit: str
+    ) -> Array:
+        """Return one non-negative number per motor."""
+        motors = self._arm.n - 1
+        array = np.full(motors, default) if value is None else np.array(value, dtype=float)
+        if array.shape != (motors,):
+            raise InvalidModel(f'{name} must have {motors} entries, got shape {array.shape}')
+        if not (array >= 0.0).all():
+            raise InvalidModel(f'{name} must be at least 0 {unit}, got {array}')
+        return array
+
+
+def rollout(
+    arm: PlanarArm,
+    profile: EffortProfile,
+    until: float,
+    *,
+    step: float = 1e-3,
+    position: npt.ArrayLike | None = None,
+    saturation: npt.ArrayLike | None = None,
+    feedback_p: npt.ArrayLike | None = None,
+    feedback_d: npt.ArrayLike | None = None,
+) -> Rollout:
+    """
+    Return the motion of an arm, at rest when the profile starts, at every step.
+
+    Parameters
+    ----------
+    arm, profile
+        What is moved and by what.
+    until
+        Absolute time of the end [s].
+    step, position, saturation, feedback_p, feedback_d
+        As in SimulatedArm.
+
+    """
+    simulated = SimulatedArm(
+        arm,
+        position=position,
+        time=profile.start,
+        step=step,
+        saturation=saturation,
+        feedback_p=feedback_p,
+        feedback_d=feedback_d,
+    )
+    simulated.command(profile, profile.start)
+    times, positions, velocities = [simulated.time], [simulated.position], [simulated.velocity]
+    while simulated.advance(min(until, simulated.time + step)):
+        times.append(simulated.time)
+        positions.append(simulated.position)
+        velocities.append(simulated.velocity)
+    return Rollout(np.array(times), np.array(positions), np.array(velocities))
+
+
+def _locked(name: str, value: npt.ArrayLike, unit: str) -> Array:
+    """Return a locked copy of finite numbers."""
+    array = np.array(value, dtype=float, order='C')
+    if not np.isfinite(array).all():
+        raise InvalidCommand(f'{name} must be finite, got a value that is not [{unit}]')
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,56 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package_name = 'flat_planner_ros'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    description='Optimal flat motion planning for planar arms with an elastic last joint.',
+    maintainer='flat_planner_ros developers',
+    maintainer_email='flat-planner-ros@users.noreply.github.com',
+    license='Apache-2.0',
+    packages=find_packages(include=[package_name, f'{package_name}.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+        (f'share/{package_name}/config', sorted(glob('config/*.yaml'))),
+        (f'share/{package_name}/launch', sorted(glob('launch/*.py'))),
+    ],
+    python_requires='>=3.10',
+    # rclpy and the message packages come from ROS or, without it, from the extra "jazzy".
+    install_requires=['numpy>=1.26,<3', 'scipy>=1.11,<2'],
+    extras_require={
+        'jazzy': [
+            'ros-jazzy-rclpy[fastrtps]==7.1.6',
+            'ros-jazzy-diagnostic-msgs==5.3.6',
+            'ros-jazzy-rosgraph-msgs==2.0.3',
+            'ros-jazzy-sensor-msgs==5.3.6',
+            'ros-jazzy-std-msgs==5.3.6',
+            'ros-jazzy-std-srvs==5.3.6',
+            'ros-jazzy-trajectory-msgs==5.3.6',
+        ],
+        'plot': ['matplotlib>=3.6,<4'],
+        'test': [
+            'hypothesis>=6.98,<7',
+            'matplotlib>=3.6,<4',
+            'mpmath>=1.2,<2',
+            'mypy>=2.4,<2.5',
+            'pytest>=7.4,<10',
+            'pytest-timeout>=2.2,<3',
+            'pyyaml>=6,<7',
+            'ruff>=0.17,<0.18',
+        ],
+    },
+    entry_points={
+        'console_scripts': [
+            'planner_node = flat_planner_ros.ros.planner_node:main',
+            'plant_node = flat_planner_ros.ros.plant_node:main',
+            'monitor_node = flat_planner_ros.ros.monitor_node:main',
+            'demo = flat_planner_ros.ros.demo:main',
+            'paper_table = flat_planner_ros.ros.paper_table:main',
+        ],
+    },
+    zip_safe=True,
+)

@@ -1,0 +1,59 @@
+"""What every test relies on: repeatable examples, an up-to-date package, a known state of ROS."""
+
+from importlib import import_module
+import os
+from pathlib import Path
+
+from hypothesis import settings
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PACKAGE = 'flat_planner_ros'
+ROS_TESTS = CHECKOUT / 'test' / 'ros'
+
+settings.register_profile('ci', derandomize=True, deadline=None, database=None, print_blob=True)
+settings.register_profile('local', deadline=None)
+settings.load_profile('ci' if os.environ.get('CI') else 'local')
+
+# Before any message class is imported, and inherited by the nodes that the tests start.
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+try:
+    import_module('rclpy')
+    ROS_ERROR = None
+except ImportError as error:
+    ROS_ERROR = error
+
+
+def _sources(package: Path) -> dict[str, str]:
+    """Return the modules below a directory by their relative path."""
+    return {str(p.relative_to(package)): p.read_text('utf-8') for p in package.rglob('*.py')}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse to test other code than that of the checkout, or to skip what must run."""
+    tested = Path(import_module(PACKAGE).__file__).parent
+    differing = _sources(tested).items() ^ _sources(CHECKOUT / PACKAGE).items()
+    if differing:
+        names = ', '.join(sorted({name for name, _ in differing}))
+        raise pytest.UsageError(
+            f'{tested} is not the code of this checkout: run "make install" (differing: {names})'
+        )
+    if ROS_ERROR is not None and os.environ.get('REQUIRE_ROS') == '1':
+        raise pytest.UsageError(f'REQUIRE_ROS=1, but rclpy is not usable: {ROS_ERROR}')
+
+
+class _NeedsRos(pytest.Module):
+    """A module of tests that is skipped as a whole."""
+
+    def collect(self):
+        """Skip, with the reason."""
+        pytest.skip(f'rclpy is not usable: {ROS_ERROR}', allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector):
+    """Skip the tests of the nodes where there is no ROS."""
+    if ROS_ERROR is not None and ROS_TESTS in module_path.parents:
+        return _NeedsRos.from_parent(parent, path=module_path)
+    return None

@@ -1,0 +1,265 @@
+"""The rules of the layout: who may import what, and what the packaging files promise."""
+
+import ast
+from functools import cache
+from pathlib import Path
+import re
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+PACKAGE = CHECKOUT / 'flat_planner_ros'
+CORE = PACKAGE / 'core'
+ROS = PACKAGE / 'ros'
+CORE_MODULES = sorted(p.stem for p in CORE.glob('*.py') if p.stem != '__init__')
+ROS_FILES = sorted(ROS.rglob('*.py'))
+NODES = sorted(ROS.glob('*_node.py'))
+
+MAY_IMPORT = {
+    'errors': '',
+    'arm': 'errors',
+    # the plant
+    'simulation': 'arm errors',
+    # the monitor
+    'oscillation_search': 'errors',
+    'oscillation': 'oscillation_search errors',
+    'motion_record': 'errors',
+    'vibration_report': 'oscillation errors',
+    'assessment': 'motion_record oscillation vibration_report errors',
+    'vibration': 'assessment motion_record oscillation vibration_report errors',
+    # the planner
+    'flatness': 'arm errors',
+    'cost': 'flatness arm errors',
+    'roots': 'errors',
+    'motion_law': 'errors',
+    'extremal': 'cost motion_law roots errors',
+    'planning': 'extremal cost flatness arm motion_law errors',
+}
+"""The modules of the core, each with the others that it may import; a new one is added here."""
+
+MESSAGES_ALLOWED = {
+    'conversions.py': 'the one place for messages and core types',
+    '*_node.py': 'the types of its topics and services',
+    'parameters.py': 'descriptors and verdicts of parameters, from rcl_interfaces',
+    'paper_table.py': 'sends goals and reads reports as any user does',
+}
+"""Patterns of the files that import message packages, each with its reason."""
+
+NEVER = ('rclpy', 'matplotlib')
+"""What importing the core must not need."""
+
+PROBE = f"""
+import importlib, os, sys
+sys.modules.update(dict.fromkeys({NEVER}))  # any import of them raises ImportError
+before = set(sys.modules)
+for name in {['', *(f'.{module}' for module in CORE_MODULES)]}:
+    importlib.import_module('flat_planner_ros.core' + name)
+allowed = sys.stdlib_module_names | {{'numpy', 'scipy', 'flat_planner_ros'}}
+libraries = [sys.modules[name].__file__ for name in ('numpy', 'scipy') if name in sys.modules]
+homes = tuple(map(os.path.dirname, libraries))  # some compiled modules there have names of their own
+new = set()
+for name in set(sys.modules) - before:
+    file = getattr(sys.modules[name], '__file__', None)
+    if file and not file.startswith(homes) and not name.startswith('_sysconfigdata'):
+        new.add(name.partition('.')[0])
+print(*sorted(new))
+sys.exit(f'the core imports {{sorted(new - allowed)}}' if new - allowed else 0)
+"""
+
+
+@cache
+def imports(path: Path) -> frozenset[str]:
+    """Return the absolute names of all modules that a file of the package may import."""
+    package = path.relative_to(CHECKOUT).parent.parts
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text('utf-8'))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else ()
+            module = '.'.join((*base, *filter(None, [node.module])))
+            found.update([module, *(f'{module}.{alias.name}' for alias in node.names)])
+    return frozenset(found)
+
+
+def roots(path: Path) -> set[str]:
+    """Return the top-level packages that a file imports."""
+    return {name.partition('.')[0] for name in imports(path)}
+
+
+def is_message_package(name: str) -> bool:
+    """Tell message packages by ROS's convention for their names."""
+    return name.endswith(('_msgs', '_srvs', '_interfaces'))
+
+
+def is_ros(name: str) -> bool:
+    """Tell the packages that only a ROS environment has."""
+    return is_message_package(name) or name.startswith(('rclpy', 'rcl_', 'ament_', 'launch'))
+
+
+def core_imports(module: str) -> set[str]:
+    """Return the other modules of the core that one of them imports."""
+    prefix = 'flat_planner_ros.core.'
+    names = {
+        n.removeprefix(prefix).partition('.')[0]
+        for n in imports(CORE / f'{module}.py')
+        if n.startswith(prefix)
+    }
+    return (names & set(CORE_MODULES)) - {module}
+
+
+@cache
+def setup_arguments() -> dict[str, object]:
+    """Return the keywords of the call in setup.py that are literals."""
+    tree = ast.parse((CHECKOUT / 'setup.py').read_text('utf-8'))
+    call = next(
+        n
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Call) and getattr(n.func, 'id', '') == 'setup'
+    )
+    arguments = {}
+    for keyword in call.keywords:
+        try:
+            arguments[keyword.arg] = ast.literal_eval(keyword.value)
+        except ValueError:
+            continue
+    return arguments
+
+
+def distributions(requirements: list[str]) -> set[str]:
+    """Return the names in a list of pip requirements."""
+    return {re.match(r'[\w.-]+', requirement)[0] for requirement in requirements}
+
+
+def manifest(tag: str) -> set[str]:
+    """Return the texts of all elements of package.xml with a tag."""
+    return {e.text for e in ElementTree.parse(CHECKOUT / 'package.xml').iter(tag)}
+
+
+def scripts() -> list[str]:
+    """Return the entry points of setup.py, each as "name = module:function"."""
+    return setup_arguments()['entry_points']['console_scripts']
+
+
+def test_core_needs_only_numpy_and_scipy():
+    run = subprocess.run([sys.executable, '-c', PROBE], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert 'flat_planner_ros' in run.stdout.split()
+
+
+def test_only_the_ros_layer_imports_ros():
+    others = [p for p in PACKAGE.rglob('*.py') if p not in ROS_FILES]
+    assert len(others) > len(CORE_MODULES)
+    assert {p.name: found for p in others if (found := set(filter(is_ros, roots(p))))} == {}
+
+
+def test_the_core_does_not_import_the_ros_layer():
+    for module in CORE_MODULES:
+        names = imports(CORE / f'{module}.py')
+        assert not [n for n in names if n.startswith('flat_planner_ros.ros')], module
+
+
+def test_the_ros_layer_uses_the_public_list_of_the_core():
+    private = {f'flat_planner_ros.core.{module}' for module in CORE_MODULES}
+    assert {p.name: found for p in ROS_FILES if (found := imports(p) & private)} == {}
+
+
+def test_core_modules_do_not_import_through_the_public_list():
+    public = 'flat_planner_ros.core'
+    assert [m for m in CORE_MODULES if public in imports(CORE / f'{m}.py')] == []
+
+
+def test_every_core_module_has_its_place():
+    assert set(CORE_MODULES) <= set(MAY_IMPORT)
+
+
+@pytest.mark.parametrize('module', CORE_MODULES)
+def test_core_modules_import_in_one_direction(module):
+    assert core_imports(module) <= set(MAY_IMPORT.get(module, '').split())
+
+
+def test_plant_and_monitor_know_nothing_of_planning():
+    def reach(module: str) -> set[str]:
+        return {module}.union(*map(reach, MAY_IMPORT[module].split()))
+
+    planner = {'flatness', 'cost', 'roots', 'extremal', 'motion_law', 'planning'}
+    for module in ('simulation', 'oscillation', 'vibration'):
+        assert not planner & reach(module)
+
+
+@pytest.mark.parametrize('node', NODES, ids=lambda path: path.stem)
+def test_nodes_do_not_import_each_other(node):
+    others = {path.stem for path in NODES if path != node}
+    assert not {name.rpartition('.')[2] for name in imports(node)} & others
+
+
+@pytest.mark.parametrize('path', ROS_FILES, ids=lambda path: path.stem)
+def test_message_packages_have_few_importers(path):
+    if not any(path.match(pattern) for pattern in MESSAGES_ALLOWED):
+        assert not set(filter(is_message_package, roots(path)))
+
+
+def test_versions_agree():
+    assert manifest('version') == {setup_arguments()['version']}
+
+
+def test_descriptions_of_the_package_agree():
+    arguments = setup_arguments()
+    assert manifest('license') == {arguments['license']}
+    assert manifest('maintainer') == {arguments['maintainer']}
+    maintainer = ElementTree.parse(CHECKOUT / 'package.xml').find('maintainer')
+    assert maintainer.get('email') == arguments['maintainer_email']
+
+
+def test_dependencies_agree():
+    extras = setup_arguments()['extras_require']
+    python = {
+        name.removeprefix('python3-')
+        for name in manifest('exec_depend')
+        if name.startswith('python3-')
+    }
+    ros = {name for name in manifest('exec_depend') if is_message_package(name)} | {'rclpy'}
+    assert python == distributions(setup_arguments()['install_requires'])
+    assert {name.replace('_', '-') for name in ros} == {
+        name.removeprefix('ros-jazzy-') for name in distributions(extras['jazzy'])
+    }
+    assert {'matplotlib'} == distributions(extras['plot'])
+
+
+def test_test_dependencies_agree():
+    extra = {
+        name.replace('pyyaml', 'yaml')
+        for name in distributions(setup_arguments()['extras_require']['test'])
+    }
+    declared = {name.removeprefix('python3-') for name in manifest('test_depend')}
+    only_pip = {'mpmath', 'mypy', 'pytest-timeout', 'ruff'}
+    assert declared | only_pip == extra
+
+
+def test_what_is_imported_is_declared():
+    declared = manifest('exec_depend') | {'numpy', 'scipy', 'matplotlib', 'flat_planner_ros'}
+    declared |= {'rcl_interfaces'}  # part of rclpy's own interface
+    used = set().union(*map(roots, [*PACKAGE.rglob('*.py'), *CHECKOUT.glob('launch/*.py')]))
+    assert used - sys.stdlib_module_names <= declared
+
+
+@pytest.mark.parametrize('script', scripts(), ids=lambda script: script.partition(' ')[0])
+def test_scripts_have_their_function(script):
+    module, _, function = script.partition(' = ')[2].partition(':')
+    path = CHECKOUT / f'{module.replace(".", "/")}.py'
+    assert path.is_file()
+    definitions = ast.parse(path.read_text('utf-8')).body
+    assert function in {n.name for n in definitions if isinstance(n, ast.FunctionDef)}
+
+
+@pytest.mark.parametrize('path', sorted(CHECKOUT.glob('test/**/*.py')), ids=lambda path: path.stem)
+def test_tests_use_the_real_thing(path):
+    nodes = list(ast.walk(ast.parse(path.read_text('utf-8'))))
+    names = {n.id for n in nodes if isinstance(n, ast.Name)}
+    names |= {n.attr for n in nodes if isinstance(n, ast.Attribute)}
+    names |= {n.arg for n in nodes if isinstance(n, ast.arg)}
+    names |= {part for name in imports(path) for part in name.split('.')}
+    assert not names & {'mock', 'mocker', 'Mock', 'MagicMock', 'patch'}
