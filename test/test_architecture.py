@@ -59,7 +59,7 @@ for name in {['', *(f'.{module}' for module in CORE_MODULES)]}:
     importlib.import_module('flat_planner_ros.core' + name)
 allowed = sys.stdlib_module_names | {{'numpy', 'scipy', 'flat_planner_ros'}}
 libraries = [sys.modules[name].__file__ for name in ('numpy', 'scipy') if name in sys.modules]
-homes = tuple(map(os.path.dirname, libraries))  # some compiled modules there have names of their own
+homes = tuple(map(os.path.dirname, libraries))  # of compiled modules with names of their own
 new = set()
 for name in set(sys.modules) - before:
     file = getattr(sys.modules[name], '__file__', None)

@@ -1,1 +1,70 @@
 """Planning, dynamics and judgement of flat elastic arms; free of ROS, files and clocks."""
+
+from flat_planner_ros.core.arm import NaturalMode, PlanarArm
+from flat_planner_ros.core.cost import QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.errors import (
+    FlatPlannerError,
+    InvalidCommand,
+    InvalidCost,
+    InvalidModel,
+    InvalidRequest,
+    NotFlat,
+    UncertifiedPlan,
+)
+from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
+from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.motion_law import MotionLaw
+from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
+from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
+from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.simulation import ArmState, EffortProfile, rollout, SimulatedArm
+from flat_planner_ros.core.vibration import VibrationMonitor
+from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
+
+__all__ = [
+    'ArmState',
+    'EffortProfile',
+    'fit_oscillation',
+    'flat_map',
+    'FlatMap',
+    'FlatModel',
+    'FlatPlannerError',
+    'Goal',
+    'GoalPoint',
+    'InvalidCommand',
+    'InvalidCost',
+    'InvalidModel',
+    'InvalidRequest',
+    'JointSample',
+    'Level',
+    'MonitorSettings',
+    'Motion',
+    'MotionLaw',
+    'MotionRequest',
+    'NaturalMode',
+    'NotFlat',
+    'OscillationFit',
+    'Plan',
+    'plan',
+    'PlanarArm',
+    'PlannedMotion',
+    'PlannerSession',
+    'PlanningOptions',
+    'PlanSamples',
+    'QuadraticCost',
+    'Reason',
+    'RequestRejected',
+    'Residual',
+    'rest_target',
+    'rollout',
+    'select',
+    'SessionSettings',
+    'SimulatedArm',
+    'StartSource',
+    'Strategy',
+    'strategy_cost',
+    'UncertifiedPlan',
+    'VibrationMonitor',
+    'VibrationReport',
+]

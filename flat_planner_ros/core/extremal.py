@@ -170,8 +170,7 @@ def _power_series(factor: ComplexArray) -> ComplexArray:
             table[:, k] = table[:, k - size : k] @ tail
     else:
         table = table[:, :size]
-    result: ComplexArray = table / _factorials(table.shape[1])
-    return result
+    return np.asarray(table / _factorials(table.shape[1]), dtype=complex)
 
 
 @cache

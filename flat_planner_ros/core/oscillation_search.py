@@ -32,20 +32,8 @@ DAMPING_LIMIT = 2.0
 NYQUIST_SHARE = 0.95
 """Highest frequency of a fit relative to half the median sampling rate [-]."""
 
-SLOW_PERIODS = np.arange(SEARCH_PERIODS, 8.0, 0.25)
-"""Frequencies tried with bias and drift in the fit [periods in the samples]."""
-
-SLOW_DAMPING = (0.0, 0.05, 0.15, 0.4)
-"""Decays tried with them, relative to the angular frequency [-]."""
-
-FAST_DAMPING = (0.0, 0.01, 0.05, 0.2)
+START_DAMPING = (0.0, 0.01, 0.05, 0.2)
 """Decays tried at the peaks of the spectrum, relative to the angular frequency [-]."""
-
-LONG_DECAYS = (1.0, 3.0, 10.0)
-"""Decays tried at the peaks besides, over the samples, which long records need [-]."""
-
-COARSE_SAMPLES = 256
-"""Number of averaged samples on which the slow frequencies are tried [-]."""
 
 SPECTRUM_SAMPLES = 2**15
 """Most samples of the resampled signal behind the spectrum [-]."""
@@ -54,7 +42,7 @@ SPECTRUM_PADDING = 4
 """Zero padding of the spectrum relative to the signal's length [-]."""
 
 CANDIDATES = 3
-"""Number of starting points taken from each search, and refined at the end [-]."""
+"""Number of peaks of the spectrum tried, and of frequencies refined [-]."""
 
 FIT_TOLERANCE = 1e-13
 """Relative change of cost and unknowns at which the fit ends [-]."""
@@ -100,27 +88,15 @@ def _misfit(u: Array, y: Array, rates: Array) -> Array:
     return misfit
 
 
-def _grid(w: Array, decays: tuple[float, ...], power: float = 1.0) -> Array:
-    """Return all pairs (w, decay w^power), shape (len(w) len(decays), 2)."""
-    return np.stack((np.repeat(w, len(decays)), np.outer(w**power, decays).ravel()), axis=-1)
-
-
 def _best(u: Array, y: Array, rates: Array) -> Array:
     """Return the few best rates with different w, best first, shape (<= CANDIDATES, 2)."""
     ranked = rates[np.argsort(_misfit(u, y, rates))]
     _, first = np.unique(ranked[:, 0], return_index=True)
-    return ranked[np.sort(first)[:CANDIDATES]]
+    best: Array = ranked[np.sort(first)[:CANDIDATES]]
+    return best
 
 
-def _slow_starts(u: Array, y: Array) -> Array:
-    """Return starts with few periods, where bias and drift hide the spectral peak: (c, 2)."""
-    block = -(-u.size // COARSE_SAMPLES)
-    whole = u.size - u.size % block
-    coarse_u, coarse_y = (x[:whole].reshape(-1, block).mean(axis=1) for x in (u, y))
-    return _best(coarse_u, coarse_y, _grid(2 * pi * SLOW_PERIODS, SLOW_DAMPING))
-
-
-def _fast_starts(u: Array, y: Array) -> Array:
+def _starts(u: Array, y: Array) -> Array:
     """Return starts at the highest peaks of the resampled signal's spectrum: (c, 2)."""
     count = int(min(round(1.0 / float(np.median(np.diff(u)))) + 1, SPECTRUM_SAMPLES))
     grid = np.linspace(0.0, 1.0, count)
@@ -130,8 +106,11 @@ def _fast_starts(u: Array, y: Array) -> Array:
     power = np.abs(rfft(signal, length))
     peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
     peaks = peaks[np.argsort(-power[peaks])][:CANDIDATES]
-    w = 2 * pi * peaks * (count - 1) / length
-    return np.concatenate((_grid(w, FAST_DAMPING), _grid(w, LONG_DECAYS, 0.0)))
+    # One period besides: the trend may have taken the only peak.
+    w = 2 * pi * np.append(peaks * (count - 1) / length, 1.0)
+    return np.stack(
+        (np.repeat(w, len(START_DAMPING)), np.outer(w, START_DAMPING).ravel()), axis=-1
+    )
 
 
 def best_rates(u: Array, y: Array) -> Array:
@@ -154,8 +133,7 @@ def best_rates(u: Array, y: Array) -> Array:
     highest = max(NYQUIST_SHARE * pi / float(np.median(np.diff(u))), 2 * pi)
     lower = np.array((2 * pi * SEARCH_PERIODS, -GROWTH_LIMIT))
     upper = np.array((highest, DAMPING_LIMIT * highest))
-    starts = np.concatenate((_slow_starts(u, y), _fast_starts(u, y)))
-    starts = np.clip(starts, lower, upper)
+    starts = np.clip(_starts(u, y), lower, upper)
     results = [_descend(u, y, start, lower, upper) for start in _best(u, y, starts)]
     best = min(results, key=lambda result: float(result.cost))
     return np.asarray(best.x, dtype=float)

@@ -176,6 +176,17 @@ def test_repeated_times_are_too_few():
     assert 'too few' in fit.reason
 
 
+def test_any_number_of_samples_and_periods_is_answered():
+    rng = np.random.default_rng(7)
+    found = 0
+    for _ in range(200):
+        times = np.sort(rng.uniform(0.0, 1.0, rng.integers(12, 60)))
+        fit = fit_oscillation(times, np.cos(2 * np.pi * rng.uniform(0.1, 9.0) * times), 0.0)
+        assert (fit.frequency is None) == bool(fit.reason)
+        found += fit.frequency is not None
+    assert found > 100
+
+
 def test_a_gap_and_a_late_start_leave_the_amplitude_at_the_end_of_the_motion():
     elapsed = grid(4.0, 200.0)
     seen = elapsed[(elapsed > 0.4) & ((elapsed < 1.2) | (elapsed > 2.5))]

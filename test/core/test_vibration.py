@@ -1,5 +1,6 @@
 """The monitor gives one true report per motion, whatever the samples and plans do."""
 
+from dataclasses import replace
 from time import perf_counter
 
 from flat_planner_ros.core.errors import InvalidRequest
@@ -157,12 +158,21 @@ def test_settling_time_is_when_the_envelope_has_left_the_band(monitor):
 def test_an_oscillation_that_stays_above_the_band_is_not_settled(monitor):
     motion = planned()
     monitor.plan(motion)
-    # Ends the window within the band, but on the way through zero only.
     report = only(feed(monitor, motion, 9.9, 13.2, 0.1))
     assert not report.settled
     assert report.settling_time is None
     assert 'not settled' in report.message
     assert report.amplitude == pytest.approx(0.1, rel=1e-6)
+
+
+def test_passing_through_the_band_is_not_settling():
+    # The window ends after 3.75 periods, where the oscillation is at zero.
+    monitor = VibrationMonitor(replace(SETTINGS, window=3.75 / FREQUENCY, settling_band=8e-3))
+    motion = planned()
+    monitor.plan(motion)
+    assert not only(feed(monitor, motion, 9.9, 13.1, 0.1)).settled
+    last = sample(motion.end + 3.75 / FREQUENCY, motion, 0.1)
+    assert abs(last.positions[1]) < 1e-3
 
 
 def test_final_error_is_the_mean_over_the_last_whole_period(monitor):
@@ -289,6 +299,17 @@ def test_a_future_motion_after_the_window_cuts_nothing(monitor):
     first = only(feed(monitor, former, 11.5, 14.0))
     assert 'cut short' not in first.message
     assert only(feed(monitor, following, 14.0, 17.1)).start_time == 14.0
+
+
+def test_a_motion_after_the_window_is_not_said_to_cut_it(monitor):
+    former, following = planned(), planned(start=13.1)
+    monitor.plan(former)
+    feed(monitor, former, 9.9, 12.9)
+    monitor.plan(following)
+    # The sample that would have closed the window is missing.
+    report = monitor.add(sample(13.2, following))
+    assert report.start_time == 10.0
+    assert 'cut short' not in report.message
 
 
 def test_a_motion_spliced_into_a_running_one_keeps_its_samples(monitor):

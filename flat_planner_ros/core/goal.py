@@ -1,0 +1,294 @@
+"""Goals as users send them, and the rules that an admissible one obeys (docs/interfaces.md)."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import isfinite
+from typing import NamedTuple
+
+from flat_planner_ros.core.errors import FlatPlannerError
+
+MAX_ANGLE = 1e6
+"""Largest joint angle of a goal [rad]: beyond, a motion drowns in the rounding of its position."""
+
+MAX_POINTS = 51
+"""Most points of a goal: 50 via points and the final one."""
+
+MAX_NAME = 64
+"""Characters of a foreign name that a message repeats."""
+
+
+class Reason(Enum):
+    """Why a request is rejected; the names are those of the ROS interface."""
+
+    INVALID_GOAL = 'INVALID_GOAL'
+    INVALID_JOINTS = 'INVALID_JOINTS'
+    OLD_HEADER_TIMESTAMP = 'OLD_HEADER_TIMESTAMP'
+    EMPTY_GOAL = 'EMPTY_GOAL'
+    NON_FINITE = 'NON_FINITE'
+    SIZE_MISMATCH = 'SIZE_MISMATCH'
+    TIME_NOT_INCREASING = 'TIME_NOT_INCREASING'
+    NONZERO_END_STATE = 'NONZERO_END_STATE'
+    PASSIVE_JOINT_NOT_ZERO = 'PASSIVE_JOINT_NOT_ZERO'
+    EFFORT_NOT_ALLOWED = 'EFFORT_NOT_ALLOWED'
+    POSITION_LIMIT = 'POSITION_LIMIT'
+    DURATION_OUT_OF_RANGE = 'DURATION_OUT_OF_RANGE'
+    START_STATE_UNKNOWN = 'START_STATE_UNKNOWN'
+    START_STATE_STALE = 'START_STATE_STALE'
+    START_STATE_MISMATCH = 'START_STATE_MISMATCH'
+    NOT_AT_REST = 'NOT_AT_REST'
+    SOLVER_FAILED = 'SOLVER_FAILED'
+    ILL_CONDITIONED = 'ILL_CONDITIONED'
+    BUSY = 'BUSY'
+    INTERNAL = 'INTERNAL'
+
+
+class RequestRejected(FlatPlannerError):
+    """
+    A request that is answered with a refusal.
+
+    Attributes
+    ----------
+    reason
+        The rule that it breaks.
+    joint
+        The joint concerned, if one is.
+    value, limit
+        What was found and what is allowed, in SI units, where the rule has numbers.
+    time
+        Where in the motion [s], if it matters.
+
+    """
+
+    def __init__(
+        self,
+        reason: Reason,
+        message: str,
+        *,
+        joint: str | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+        time: float | None = None,
+    ) -> None:
+        """Keep the numbers apart from the sentence."""
+        super().__init__(message)
+        self.reason = reason
+        self.joint = joint
+        self.value = value
+        self.limit = limit
+        self.time = time
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalPoint:
+    """
+    One point of a goal; entries follow the goal's joint names.
+
+    Attributes
+    ----------
+    time
+        From the start of the motion [s]; 0 when the planner is to choose.
+    positions, velocities, accelerations, effort
+        [rad, rad/s, rad/s^2, N m]; empty where not given.
+
+    """
+
+    time: float
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] = ()
+    accelerations: tuple[float, ...] = ()
+    effort: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """
+    A request as received, not yet checked.
+
+    Attributes
+    ----------
+    joint_names
+        In any order.
+    points
+        Via points and, last, the final pose at rest.
+    stamp
+        Absolute time of the start [s]; None for as soon as possible.
+
+    """
+
+    joint_names: tuple[str, ...]
+    points: tuple[GoalPoint, ...]
+    stamp: float | None = None
+
+
+class RestTarget(NamedTuple):
+    """
+    What an admissible goal asks for.
+
+    Attributes
+    ----------
+    positions
+        Final angles in kinematic order, the passive joint last and zero [rad].
+    duration
+        Prescribed time of the motion [s]; None when the planner is to choose.
+
+    """
+
+    positions: tuple[float, ...]
+    duration: float | None
+
+
+def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
+    """
+    Return the target of a goal that obeys every rule.
+
+    Parameters
+    ----------
+    goal
+        The request.
+    joints
+        The arm's joints in kinematic order, the passive one last.
+
+    Raises
+    ------
+    RequestRejected
+        The first rule that the goal breaks, with joint, value and limit.
+
+    """
+    _check_joints(goal, joints)
+    for index, point in enumerate(goal.points):
+        _check_point(goal, index, point)
+    duration = _checked_duration(goal)
+    final = goal.points[-1]
+    for quantity, values in (
+        ('velocity', final.velocities),
+        ('acceleration', final.accelerations),
+    ):
+        for name, value in zip(goal.joint_names, values, strict=False):
+            if value != 0.0:
+                raise RequestRejected(
+                    Reason.NONZERO_END_STATE,
+                    f'the motion must end at rest, but the final {quantity} of {name} is '
+                    f'{value:g}; leave it out or set it to 0',
+                    joint=name,
+                    value=value,
+                    limit=0.0,
+                )
+    angles = dict(zip(goal.joint_names, final.positions, strict=True))
+    passive = joints[-1]
+    if angles.setdefault(passive, 0.0) != 0.0:
+        raise RequestRejected(
+            Reason.PASSIVE_JOINT_NOT_ZERO,
+            f'the spring of {passive} holds no angle at rest: its final position must be 0 rad, '
+            f'got {angles[passive]:g} rad',
+            joint=passive,
+            value=angles[passive],
+            limit=0.0,
+        )
+    if len(goal.points) > 1:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'via points are not available in this version: send one point, got '
+            f'{len(goal.points)}',
+            value=float(len(goal.points)),
+            limit=1.0,
+        )
+    return RestTarget(tuple(angles[name] for name in joints), duration)
+
+
+def _check_joints(goal: Goal, joints: Sequence[str]) -> None:
+    """Refuse an empty goal and names that are not each actuated joint once."""
+    if not goal.joint_names or not goal.points:
+        missing = 'joint names' if not goal.joint_names else 'points'
+        raise RequestRejected(Reason.EMPTY_GOAL, f'the goal has no {missing}')
+    if len(goal.points) > MAX_POINTS:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal has {len(goal.points)} points, more than {MAX_POINTS}',
+            value=float(len(goal.points)),
+            limit=float(MAX_POINTS),
+        )
+    known = ', '.join(joints)
+    for name, count in Counter(goal.joint_names).items():
+        if name not in joints:
+            problem = f'unknown joint {name[:MAX_NAME]!r}'
+        elif count > 1:
+            problem = f'joint {name!r} occurs {count} times'
+        else:
+            continue
+        raise RequestRejected(
+            Reason.INVALID_JOINTS, f'{problem}; the arm has {known}', joint=name[:MAX_NAME]
+        )
+    for name in joints[:-1]:
+        if name not in goal.joint_names:
+            raise RequestRejected(
+                Reason.INVALID_JOINTS,
+                f'the actuated joint {name!r} is missing; the arm has {known}',
+                joint=name,
+            )
+
+
+def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
+    """Refuse wrong sizes, efforts, and numbers that no motion could reach."""
+    count = len(goal.joint_names)
+    if point.effort:
+        raise RequestRejected(
+            Reason.EFFORT_NOT_ALLOWED,
+            f'point {index} has effort; the planner computes it, leave it empty',
+            value=float(len(point.effort)),
+            limit=0.0,
+            time=point.time,
+        )
+    for quantity, values in (
+        ('positions', point.positions),
+        ('velocities', point.velocities),
+        ('accelerations', point.accelerations),
+    ):
+        if len(values) != count and (values or quantity == 'positions'):
+            raise RequestRejected(
+                Reason.SIZE_MISMATCH,
+                f'point {index} has {len(values)} {quantity} for {count} joints',
+                value=float(len(values)),
+                limit=float(count),
+                time=point.time,
+            )
+        for name, value in zip(goal.joint_names, values, strict=False):
+            if not isfinite(value):
+                raise RequestRejected(
+                    Reason.NON_FINITE,
+                    f'{quantity} of {name} in point {index} are not finite: {value}',
+                    joint=name,
+                    value=value,
+                    time=point.time,
+                )
+    for name, value in zip(goal.joint_names, point.positions, strict=True):
+        if abs(value) > MAX_ANGLE:
+            raise RequestRejected(
+                Reason.POSITION_LIMIT,
+                f'position {value:g} rad of {name} in point {index} exceeds {MAX_ANGLE:g} rad',
+                joint=name,
+                value=value,
+                limit=MAX_ANGLE,
+                time=point.time,
+            )
+
+
+def _checked_duration(goal: Goal) -> float | None:
+    """Return the prescribed duration, None for an automatic one."""
+    times = [point.time for point in goal.points]
+    if not any(times):
+        return None
+    previous = 0.0
+    for index, time in enumerate(times):
+        if not time > previous:
+            raise RequestRejected(
+                Reason.TIME_NOT_INCREASING,
+                f'time_from_start must be zero in all points or increase from above zero, but '
+                f'point {index} has {time:g} s after {previous:g} s',
+                value=time,
+                limit=previous,
+                time=time,
+            )
+        previous = time
+    return times[-1]

@@ -1,0 +1,301 @@
+"""Messages to core types and back; the only place where one becomes the other."""
+
+from array import array
+from collections.abc import Sequence
+
+from builtin_interfaces.msg import Duration, Time
+from flat_planner_ros.core import (
+    ArmState,
+    EffortProfile,
+    Goal,
+    GoalPoint,
+    InvalidCommand,
+    InvalidRequest,
+    JointSample,
+    Motion,
+    PlannedMotion,
+    PlanSamples,
+    Reason,
+    RequestRejected,
+    select,
+)
+from flat_planner_ros.core.goal import MAX_POINTS
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+FloatArray = NDArray[np.float64]
+
+NANOSECONDS = 1_000_000_000
+"""In one second."""
+
+
+def seconds(time: Time | Duration) -> float:
+    """Return a stamp or a duration in seconds."""
+    return time.sec + time.nanosec / NANOSECONDS
+
+
+def time_msg(time: float) -> Time:
+    """Return the stamp of an absolute time [s]."""
+    sec, nanosec = divmod(round(time * NANOSECONDS), NANOSECONDS)
+    return Time(sec=sec, nanosec=nanosec)
+
+
+def duration_msg(duration: float) -> Duration:
+    """Return the message of a duration [s]."""
+    sec, nanosec = divmod(round(duration * NANOSECONDS), NANOSECONDS)
+    return Duration(sec=sec, nanosec=nanosec)
+
+
+def goal_from_trajectory(msg: JointTrajectory) -> Goal:
+    """
+    Return the goal that a trajectory message states, unchecked but for its length.
+
+    Raises
+    ------
+    RequestRejected
+        More points than any goal may have; they are not even copied.
+
+    """
+    if len(msg.points) > MAX_POINTS:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal has {len(msg.points)} points, more than {MAX_POINTS}',
+            value=float(len(msg.points)),
+            limit=float(MAX_POINTS),
+        )
+    points = tuple(
+        GoalPoint(
+            time=seconds(point.time_from_start),
+            positions=tuple(point.positions),
+            velocities=tuple(point.velocities),
+            accelerations=tuple(point.accelerations),
+            effort=tuple(point.effort),
+        )
+        for point in msg.points
+    )
+    return Goal(joint_names=tuple(msg.joint_names), points=points, stamp=_stamp(msg))
+
+
+def goal_from_joint_state(msg: JointState) -> Goal:
+    """Return the goal that a joint state states: a final pose, the duration left open."""
+    point = GoalPoint(
+        time=0.0,
+        positions=tuple(msg.position),
+        velocities=tuple(msg.velocity),
+        effort=tuple(msg.effort),
+    )
+    return Goal(joint_names=tuple(msg.name), points=(point,), stamp=_stamp(msg))
+
+
+def sample_from_joint_state(msg: JointState, joints: Sequence[str]) -> JointSample:
+    """
+    Return a measured state in the order of the arm's joints.
+
+    Parameters
+    ----------
+    msg
+        Joints by name, in any order, perhaps with others among them; velocity and effort may be
+        empty or NaN.
+    joints
+        The arm's joints.
+
+    Raises
+    ------
+    InvalidRequest
+        A joint is missing or the arrays do not fit the names.
+
+    """
+    indices = select(msg.name, joints)
+    count = len(msg.name)
+    if len(msg.position) != count:
+        raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
+    return JointSample(
+        time=seconds(msg.header.stamp),
+        positions=np.asarray(msg.position, dtype=float)[indices],
+        velocities=_optional(msg.velocity, count, indices),
+        efforts=_optional(msg.effort, count, indices),
+    )
+
+
+def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
+    """
+    Return the motion that a plan states.
+
+    Raises
+    ------
+    InvalidRequest
+        The message is no complete, finite motion.
+
+    """
+    return PlannedMotion(
+        joint_names=tuple(msg.joint_names),
+        start=seconds(msg.header.stamp),
+        times=_times(msg),
+        positions=_table(msg, 'positions'),
+        velocities=_optional_table(msg, 'velocities'),
+        efforts=_optional_table(msg, 'effort'),
+    )
+
+
+def profile_from_trajectory(
+    msg: JointTrajectory, joints: Sequence[str], now: float
+) -> EffortProfile:
+    """
+    Return the command that a trajectory message states.
+
+    Parameters
+    ----------
+    msg
+        Joints in any order, the passive one with zero effort or left out; stamp 0 means now.
+    joints
+        The plant's joints, the passive one last.
+    now
+        Present time [s].
+
+    Raises
+    ------
+    InvalidCommand
+        The message cannot be played as it stands.
+
+    """
+    names = list(msg.joint_names)
+    if sorted(names) not in (sorted(joints), sorted(joints[:-1])):
+        raise InvalidCommand(f'joints are {names}, expected {list(joints)}')
+    try:
+        efforts = _table(msg, 'effort')
+        positions = _optional_table(msg, 'positions')
+        velocities = _optional_table(msg, 'velocities')
+    except InvalidRequest as error:
+        raise InvalidCommand(str(error)) from error
+    if joints[-1] in names and efforts[:, names.index(joints[-1])].any():
+        raise InvalidCommand(f'the passive joint {joints[-1]} cannot be given an effort')
+    actuated = select(names, joints[:-1])
+    stamp = _stamp(msg)
+    return EffortProfile(
+        start=now if stamp is None else stamp,
+        times=_times(msg),
+        efforts=efforts[:, actuated],
+        positions=None if positions is None else positions[:, actuated],
+        velocities=None if velocities is None else velocities[:, actuated],
+    )
+
+
+def command_msg(
+    motion: Motion,
+    joints: Sequence[str],
+    *,
+    include_passive_joint: bool = True,
+    include_effort: bool = True,
+    absolute_stamp: bool = True,
+) -> JointTrajectory:
+    """Return the command of a motion, as joint_trajectory_controller plays it."""
+    samples = motion.samples
+    count = len(joints) if include_passive_joint else len(joints) - 1
+    tables = [samples.positions, samples.velocities, samples.accelerations]
+    if include_effort:
+        tables.append(samples.efforts)
+    msg = _trajectory_msg(joints[:count], samples.times, [table[:, :count] for table in tables])
+    if absolute_stamp:
+        msg.header.stamp = time_msg(motion.start)
+    return msg
+
+
+def flat_plan_msg(motion: Motion) -> JointTrajectory:
+    """Return the flat outputs of a motion and the higher derivatives of y1."""
+    flat = motion.samples.flat
+    names = [f'y{k + 1}' for k in range(len(flat))] + ['y1_d3']
+    tables = [np.vstack([flat[:, k], flat[0, k + 3]]).T for k in range(3)]
+    msg = _trajectory_msg(names, motion.samples.times, tables)
+    msg.header.stamp = time_msg(motion.start)
+    return msg
+
+
+def reference_msg(samples: PlanSamples, joints: Sequence[str], now: float) -> JointState:
+    """Return what is planned for the present time."""
+    return _joint_state_msg(
+        joints, now, samples.positions[0], samples.velocities[0], samples.efforts[0]
+    )
+
+
+def joint_state_msg(state: ArmState, joints: Sequence[str]) -> JointState:
+    """Return the state of the plant."""
+    return _joint_state_msg(joints, state.time, state.position, state.velocity, state.effort)
+
+
+def residual_msg(
+    joints: Sequence[str], time: float, positions: FloatArray, velocities: FloatArray | None
+) -> JointState:
+    """Return deviations of positions and, where measured, velocities."""
+    return _joint_state_msg(joints, time, positions, velocities, None)
+
+
+def _joint_state_msg(
+    joints: Sequence[str],
+    time: float,
+    position: FloatArray,
+    velocity: FloatArray | None,
+    effort: FloatArray | None,
+) -> JointState:
+    """Return a joint state with full arrays, or empty ones for what is unknown."""
+    msg = JointState(name=list(joints), position=_doubles(position))
+    msg.header.stamp = time_msg(time)
+    if velocity is not None:
+        msg.velocity = _doubles(velocity)
+    if effort is not None:
+        msg.effort = _doubles(effort)
+    return msg
+
+
+def _trajectory_msg(
+    names: Sequence[str], times: FloatArray, tables: Sequence[FloatArray]
+) -> JointTrajectory:
+    """Return positions, velocities, accelerations and perhaps efforts as points."""
+    fields = ('positions', 'velocities', 'accelerations', 'effort')[: len(tables)]
+    points = []
+    for i, time in enumerate(times.tolist()):
+        point = JointTrajectoryPoint(time_from_start=duration_msg(time))
+        for field, table in zip(fields, tables, strict=True):
+            setattr(point, field, _doubles(table[i]))
+        points.append(point)
+    return JointTrajectory(joint_names=list(names), points=points)
+
+
+def _doubles(values: FloatArray) -> array:
+    """Return what a float64[] field takes without looking at every number."""
+    return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
+
+
+def _stamp(msg: JointTrajectory | JointState) -> float | None:
+    """Return the absolute time of a header, None for the stamp 0."""
+    return seconds(msg.header.stamp) or None
+
+
+def _times(msg: JointTrajectory) -> FloatArray:
+    """Return the times of all points [s]."""
+    return np.array([seconds(point.time_from_start) for point in msg.points])
+
+
+def _table(msg: JointTrajectory, field: str) -> FloatArray:
+    """Return one field of all points, shape (points, joints)."""
+    rows = [getattr(point, field) for point in msg.points]
+    count = len(msg.joint_names)
+    for index, row in enumerate(rows):
+        if len(row) != count:
+            raise InvalidRequest(f'point {index} has {len(row)} {field} for {count} joints')
+    return np.array(rows, dtype=float).reshape(len(rows), count)
+
+
+def _optional_table(msg: JointTrajectory, field: str) -> FloatArray | None:
+    """Return one field of all points, None where no point has it."""
+    if not any(len(getattr(point, field)) for point in msg.points):
+        return None
+    return _table(msg, field)
+
+
+def _optional(values: Sequence[float], count: int, indices: NDArray[np.intp]) -> FloatArray | None:
+    """Return the wanted entries of an array that may be empty."""
+    if len(values) != count:
+        return None
+    return np.asarray(values, dtype=float)[indices]

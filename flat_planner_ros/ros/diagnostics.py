@@ -1,0 +1,136 @@
+"""Verdicts and reports as diagnostic messages: a sentence for people, pairs for tools."""
+
+from collections.abc import Mapping, Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from flat_planner_ros.core import Goal, Motion, RequestRejected
+from flat_planner_ros.ros.conversions import time_msg
+from flat_planner_ros.ros.interfaces import ERROR_CODES, STATUS_NAME
+
+ECHO_LENGTH = 16
+"""Most entries of a goal's list that a verdict repeats."""
+
+ECHO_CHARACTERS = 64
+"""Most characters of an entry that a verdict repeats."""
+
+Values = Mapping[str, float | int | str | None]
+"""Keys and values of a status; None for what is not known."""
+
+
+def array_of(status: DiagnosticStatus, now: float) -> DiagnosticArray:
+    """Return a message with one status, stamped now [s]."""
+    msg = DiagnosticArray(status=[status])
+    msg.header.stamp = time_msg(now)
+    return msg
+
+
+def status_msg(name: str, level: bytes, message: str, values: Values) -> DiagnosticStatus:
+    """Return a status; keys without a value are left out."""
+    return DiagnosticStatus(
+        name=name,
+        level=level,
+        message=message,
+        values=[
+            KeyValue(key=key, value=_text(value))
+            for key, value in values.items()
+            if value is not None
+        ],
+    )
+
+
+def accepted_status(
+    motion: Motion, goal: Goal, joints: Sequence[str], planning_time: float
+) -> DiagnosticStatus:
+    """
+    Return the verdict on a goal that became a motion.
+
+    Parameters
+    ----------
+    motion, goal
+        What became of what.
+    joints
+        The arm's joints, whose order the plan's arrays follow.
+    planning_time
+        What it took [s].
+
+    """
+    plan = motion.plan
+    peak = plan.peak_effort[-2]
+    message = (
+        f'plan {motion.plan_id}: {plan.options.strategy.value}, {plan.request.duration:g} s, '
+        f'peak effort {peak:.4g} N m, starts at {motion.start:.3f} s'
+    )
+    values: dict[str, float | int | str | None] = {
+        **_of_motion(motion, 'ACCEPTED'),
+        'planning_time': planning_time,
+        'boundary_residual': plan.boundary_residual,
+        'optimality_residual': plan.optimality_residual,
+        'cost': plan.cost_value,
+    }
+    for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
+        for joint, value in zip(joints, getattr(plan, quantity).tolist(), strict=True):
+            values[f'{quantity}.{joint}'] = value
+    return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, {**values, **_echo(goal)})
+
+
+def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStatus:
+    """Return the verdict on a goal that breaks a rule; None for one that was not even read."""
+    values: Values = {
+        'state': 'REJECTED',
+        'error_code': ERROR_CODES[error.reason],
+        'error_name': error.reason.value,
+        'joint': error.joint,
+        'value': error.value,
+        'limit': error.limit,
+        'time': error.time,
+        **({} if goal is None else _echo(goal)),
+    }
+    return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
+
+
+def finished_status(motion: Motion) -> DiagnosticStatus:
+    """Return the notice that a motion has come to its planned end."""
+    message = f'plan {motion.plan_id} finished after {motion.plan.request.duration:g} s'
+    values = _of_motion(motion, 'FINISHED')
+    return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
+
+
+def _of_motion(motion: Motion, state: str) -> Values:
+    """Return the values that tell which motion a status is about."""
+    options = motion.plan.options
+    return {
+        'plan_id': motion.plan_id,
+        'state': state,
+        'error_code': 0,
+        'error_name': 'SUCCESSFUL',
+        'strategy': options.strategy.value,
+        'flat_model': options.flat_model.value,
+        'duration': motion.plan.request.duration,
+        'start_time': f'{motion.start:.9f}',
+    }
+
+
+def _echo(goal: Goal) -> Values:
+    """Return the goal in brief: what it names, its final pose, its stamp."""
+    final = goal.points[-1] if goal.points else None
+    return {
+        'goal.joint_names': _list(goal.joint_names),
+        'goal.positions': _list(final.positions) if final else None,
+        'goal.time_from_start': final.time if final else None,
+        'goal.points': len(goal.points),
+        'goal.stamp': 0.0 if goal.stamp is None else f'{goal.stamp:.9f}',
+    }
+
+
+def _list(entries: Sequence[float | str]) -> str:
+    """Return the first entries of a list as text."""
+    shown = [_text(entry)[:ECHO_CHARACTERS] for entry in entries[:ECHO_LENGTH]]
+    more = ', ...' if len(entries) > ECHO_LENGTH else ''
+    return f'[{", ".join(shown)}{more}]'
+
+
+def _text(value: float | int | str) -> str:
+    """Return a number so that it reads well and is exact enough to compute with."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'{value:.9g}' if isinstance(value, float) else str(value)

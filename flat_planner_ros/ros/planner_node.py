@@ -1,0 +1,160 @@
+"""Planner node: goals in, certified flat motions and verdicts out (docs/interfaces.md)."""
+
+from collections.abc import Callable, Sequence
+import sys
+from time import perf_counter
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core import (
+    FlatPlannerError,
+    Goal,
+    Motion,
+    PlannerSession,
+    Reason,
+    RequestRejected,
+)
+from flat_planner_ros.ros import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.node_runner import run
+from flat_planner_ros.ros.parameters import NodeParameters
+from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+WARNING_PERIOD = 5.0
+"""Shortest time between two warnings about the same input [s]."""
+
+
+class PlannerNode(Node):
+    """Answers goals with motions of one arm."""
+
+    def __init__(self, **options: object) -> None:
+        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
+        super().__init__(interfaces.PLANNER, **options)
+        self._parameters = NodeParameters(self, ROWS, build, self._apply)
+        self._session = PlannerSession(self._settings.session)
+        publish = self.create_publisher
+        self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
+        self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
+        self._flat_plan = publish(JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED)
+        self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
+        self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.LATCHED_HISTORY)
+        listen = self.create_subscription
+        listen(JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.RELIABLE)
+        listen(JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.RELIABLE)
+        listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
+        self.create_service(Trigger, interfaces.STOP, self._on_stop)
+        self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
+
+    @property
+    def _settings(self) -> PlannerSettings:
+        """Return the settings in force."""
+        return self._parameters.settings
+
+    @property
+    def _joints(self) -> Sequence[str]:
+        """Return the arm's joints."""
+        return self._settings.session.joints
+
+    def _now(self) -> float:
+        """Return the present time [s]."""
+        return conversions.seconds(self.get_clock().now().to_msg())
+
+    def _apply(self, settings: PlannerSettings) -> None:
+        """Plan the next goals with changed parameters."""
+        self._session.settings = settings.session
+
+    def _on_goal(self, msg: JointTrajectory) -> None:
+        """Answer a goal given as a trajectory."""
+        self._answer(lambda: conversions.goal_from_trajectory(msg))
+
+    def _on_goal_state(self, msg: JointState) -> None:
+        """Answer a goal given as a pose."""
+        self._answer(lambda: conversions.goal_from_joint_state(msg))
+
+    def _on_measured(self, msg: JointState) -> None:
+        """Keep the measured state for the next start."""
+        try:
+            self._session.measure(conversions.sample_from_joint_state(msg, self._joints))
+        except FlatPlannerError as error:
+            self.get_logger().warning(
+                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
+            )
+
+    def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Plan the last goal again."""
+        status = self._answer(lambda: self._session.last_goal)
+        response.success = status.level == DiagnosticStatus.OK
+        response.message = status.message
+        return response
+
+    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Say that a motion cannot be cut short yet."""
+        response.success = False
+        response.message = 'stopping in motion is not available in this version'
+        return response
+
+    def _on_tick(self) -> None:
+        """Publish what is planned for now, and the end of a motion."""
+        now = self._now()
+        finished = self._session.finished(now)
+        if finished is not None:
+            self._publish_status(diagnostics.finished_status(finished))
+        if self._session.motion is not None:
+            samples = self._session.motion.reference(now)
+            self._reference.publish(conversions.reference_msg(samples, self._joints, now))
+
+    def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
+        """Give a goal exactly one verdict and, if it is accepted, carry it out."""
+        goal, started = None, perf_counter()
+        try:
+            goal = read()
+            motion = self._session.submit(goal, self._now())
+        except RequestRejected as error:
+            status = diagnostics.rejected_status(error, goal)
+        except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
+            self.get_logger().error(f'internal error: {error!r}')
+            rejection = RequestRejected(Reason.INTERNAL, f'internal error: {error!r}')
+            status = diagnostics.rejected_status(rejection, goal)
+        else:
+            elapsed = perf_counter() - started
+            status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)
+            self._publish_motion(motion)
+        self._publish_status(status)
+        return status
+
+    def _publish_motion(self, motion: Motion) -> None:
+        """Publish the command first: its start is near."""
+        settings = self._settings
+        plan = conversions.command_msg(motion, self._joints)
+        if settings.session.execute:
+            is_whole = settings.include_passive_joint and settings.include_effort
+            command = plan
+            if not (is_whole and settings.absolute_stamp):
+                command = conversions.command_msg(
+                    motion,
+                    self._joints,
+                    include_passive_joint=settings.include_passive_joint,
+                    include_effort=settings.include_effort,
+                    absolute_stamp=settings.absolute_stamp,
+                )
+            self._command.publish(command)
+        self._plan.publish(plan)
+        self._flat_plan.publish(conversions.flat_plan_msg(motion))
+
+    def _publish_status(self, status: DiagnosticStatus) -> None:
+        """Publish and log a verdict."""
+        self._status.publish(diagnostics.array_of(status, self._now()))
+        log = self.get_logger()
+        (log.info if status.level == DiagnosticStatus.OK else log.error)(status.message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the planner node."""
+    return run(PlannerNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

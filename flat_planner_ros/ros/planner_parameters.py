@@ -1,0 +1,255 @@
+"""Parameters of the planner node."""
+
+from dataclasses import dataclass
+from math import inf
+
+from flat_planner_ros.core import (
+    flat_map,
+    FlatModel,
+    PlanningOptions,
+    SessionSettings,
+    StartSource,
+    Strategy,
+    strategy_cost,
+)
+from flat_planner_ros.core.cost import MAX_WEIGHT, ORDER
+from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
+import numpy as np
+from rclpy.parameter import Parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSettings:
+    """
+    What the planner node does, besides planning.
+
+    Attributes
+    ----------
+    session
+        Settings of its session.
+    include_passive_joint, include_effort, absolute_stamp
+        Form of the command.
+    reference_rate
+        Rate of `~/reference` [Hz].
+
+    """
+
+    session: SessionSettings
+    include_passive_joint: bool
+    include_effort: bool
+    absolute_stamp: bool
+    reference_rate: float
+
+
+ROWS = [
+    *model_rows(read_only=False),
+    Row(
+        name='strategy',
+        default=Strategy.MIN_CONTROL_EFFORT.value,
+        description='what the motion law minimises besides its sixth derivative',
+        choices=tuple(strategy.value for strategy in Strategy),
+    ),
+    Row(
+        name='weights.r',
+        default=150.0,
+        description='weight of the control effort, raised to the power of 8',
+        lower=0.0,
+        upper=MAX_WEIGHT,
+    ),
+    Row(
+        name='weights.p',
+        default=17.0,
+        description='weight of the potential energy [1/s], raised to the power of 8',
+        lower=0.0,
+        upper=MAX_WEIGHT,
+    ),
+    Row(
+        name='weights.Q',
+        default=Parameter.Type.DOUBLE_ARRAY,
+        description='36 numbers, row by row: the cost of the strategy custom',
+    ),
+    Row(
+        name='flat_model',
+        default=FlatModel.APPROXIMATE.value,
+        description="treatment of the passive joint's damping; approximate is the paper's",
+        choices=tuple(model.value for model in FlatModel),
+    ),
+    Row(
+        name='duration.default',
+        default=0.0,
+        description='duration of goals without times [s]; 0 = automatic, not yet available',
+        lower=0.0,
+    ),
+    Row(name='duration.min', default=0.01, description='shortest duration [s]', lower=0.0),
+    Row(name='duration.max', default=600.0, description='longest duration [s]', lower=0.0),
+    Row(
+        name='limits.position_min',
+        default=Parameter.Type.DOUBLE_ARRAY,
+        description='lower position limits per joint [rad]; not yet available',
+    ),
+    Row(
+        name='limits.position_max',
+        default=Parameter.Type.DOUBLE_ARRAY,
+        description='upper position limits per joint [rad]; not yet available',
+    ),
+    Row(
+        name='limits.velocity',
+        default=Parameter.Type.DOUBLE_ARRAY,
+        description='velocity limits per joint [rad/s]; not yet available',
+    ),
+    Row(
+        name='limits.effort',
+        default=Parameter.Type.DOUBLE_ARRAY,
+        description='effort limits per joint [N m]; not yet available',
+    ),
+    Row(
+        name='sampling.period',
+        default=0.005,
+        description='spacing of the points of the command [s]',
+        lower=0.0005,
+        upper=0.01,
+    ),
+    Row(
+        name='start.source',
+        default=StartSource.AUTO.value,
+        description='where a motion starts',
+        choices=tuple(source.value for source in StartSource),
+    ),
+    Row(
+        name='start.position',
+        default=Parameter.Type.DOUBLE_ARRAY,
+        description='start for the source parameter [rad]',
+    ),
+    Row(
+        name='start.position_tolerance',
+        default=0.01,
+        description='largest deviation of the measured from the planned start [rad]',
+        lower=0.0,
+    ),
+    Row(
+        name='start.velocity_tolerance',
+        default=0.1,
+        description='largest measured velocity that counts as rest [rad/s]',
+        lower=0.0,
+    ),
+    Row(
+        name='start.joint_state_timeout',
+        default=0.5,
+        description='age from which a joint state is stale [s]',
+        lower=0.0,
+    ),
+    Row(
+        name='start_delay',
+        default=0.05,
+        description='from accepting a goal without a stamp to the start of its motion [s]',
+        lower=0.0,
+    ),
+    Row(
+        name='execute',
+        default=True,
+        description='publish commands; false = plan and report only',
+    ),
+    Row(
+        name='command.include_passive_joint',
+        default=True,
+        description='name the passive joint in the command',
+    ),
+    Row(
+        name='command.include_effort',
+        default=True,
+        description='put the feed-forward effort into the command',
+    ),
+    Row(
+        name='command.stamp',
+        default='absolute',
+        description='stamp of the command: its absolute start, or zero = on arrival',
+        choices=('absolute', 'zero'),
+    ),
+    Row(
+        name='reference_rate',
+        default=100.0,
+        description='rate of ~/reference [Hz]',
+        lower=1.0,
+        upper=1000.0,
+        read_only=True,
+    ),
+    Row(
+        name='stream_effort',
+        default=False,
+        description='stream ~/effort_commands; not yet available',
+    ),
+]
+"""All parameters of the planner node."""
+
+
+def build(values: Values) -> PlannerSettings:
+    """
+    Return the planner's settings.
+
+    Raises
+    ------
+    FlatPlannerError
+        They contradict each other, or ask for what this version does not have.
+
+    """
+    _refuse_unavailable(values)
+    joints, arm = arm_of(values)
+    options = PlanningOptions(
+        strategy=Strategy(values['strategy']),
+        r=values['weights.r'],
+        p=values['weights.p'],
+        custom=_custom_cost(values),
+        flat_model=FlatModel(values['flat_model']),
+    )
+    # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
+    strategy_cost(
+        options.strategy,
+        flat_map(arm, options.flat_model),
+        r=options.r,
+        p=options.p,
+        custom=options.custom,
+    )
+    session = SessionSettings(
+        joints=joints,
+        arm=arm,
+        options=options,
+        period=values['sampling.period'],
+        default_duration=values['duration.default'],
+        min_duration=values['duration.min'],
+        max_duration=values['duration.max'],
+        start_source=StartSource(values['start.source']),
+        start_position=tuple(values.get('start.position', ())),
+        position_tolerance=values['start.position_tolerance'],
+        velocity_tolerance=values['start.velocity_tolerance'],
+        measurement_timeout=values['start.joint_state_timeout'],
+        start_delay=values['start_delay'],
+        execute=values['execute'],
+    )
+    return PlannerSettings(
+        session=session,
+        include_passive_joint=values['command.include_passive_joint'],
+        include_effort=values['command.include_effort'],
+        absolute_stamp=values['command.stamp'] == 'absolute',
+        reference_rate=values['reference_rate'],
+    )
+
+
+def _custom_cost(values: Values) -> np.ndarray | None:
+    """Return Q as a matrix."""
+    numbers = values.get('weights.Q')
+    if numbers is None:
+        return None
+    if len(numbers) != ORDER**2:
+        raise InvalidParameter(f'weights.Q needs {ORDER**2} numbers, got {len(numbers)}')
+    return np.reshape(numbers, (ORDER, ORDER))
+
+
+def _refuse_unavailable(values: Values) -> None:
+    """Refuse what a later version will do, rather than ignore it."""
+    if values['stream_effort']:
+        raise InvalidParameter('stream_effort is not available in this version, set it to false')
+    for name, value in values.items():
+        if name.startswith('limits.') and not all(abs(number) == inf for number in value):
+            raise InvalidParameter(
+                f'{name} is not available in this version, leave it out or set it to .inf'
+            )

@@ -1,0 +1,170 @@
+"""
+Extremals in multiple precision: all characteristic roots, one 12 x 12 system, nothing clever.
+
+The even equation sum_k a_k y^(2k) = 0 is given by the roots of sum_k a_k z^k with multiplicities:
+roots beta = +-sqrt(z) contribute exp(beta t) times powers of t, those at zero powers alone. Nearly
+equal roots cost digits, of which there are plenty.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mpmath as mp
+import numpy as np
+
+DIGITS = 140
+"""Decimal digits; twelve roots that are equal to 1e-6 use up about seventy of them."""
+
+CONDITIONS = 6
+"""Conditions at either end: the value and five derivatives."""
+
+MAX_SWEEPS = 400
+"""Bound on the sweeps of the root finder."""
+
+Roots = list[tuple[mp.mpc, int]]
+
+
+def characteristic(*, both, last, stiffness, damping, r, p) -> list[mp.mpf]:
+    """Return a_0 ... a_6 of y6^2 + r^8 tau^2 + p^8 y2^2 with the paper's effort tau."""
+    with mp.workdps(DIGITS):
+        both, last, k, c, r, p = map(mp.mpf, (both, last, stiffness, damping, r, p))
+        compliant = last * (both - last) / k
+        weight = r**8
+        return [
+            mp.mpf(0),
+            mp.mpf(0),
+            weight * both**2 + p**8,
+            2 * weight * both * compliant,
+            weight * compliant**2,
+            -weight * (compliant * c / k) ** 2,
+            mp.mpf(1),
+        ]
+
+
+def polynomial(roots: Roots) -> list[mp.mpf]:
+    """Return the ascending coefficients of the monic polynomial with the given roots."""
+    with mp.workdps(DIGITS):
+        ascending = [mp.mpc(1)]
+        for root, multiplicity in roots:
+            for _ in range(multiplicity):
+                shifted = [mp.mpc(0), *ascending]
+                scaled = [root * a for a in ascending] + [0]
+                ascending = [a - b for a, b in zip(shifted, scaled, strict=True)]
+        return [mp.re(a) for a in ascending]
+
+
+def square_roots(ascending: Sequence[float]) -> Roots:
+    """Return the roots z, zero with its exact multiplicity, all others taken as simple."""
+    with mp.workdps(DIGITS):
+        coefficients = [mp.mpf(a) for a in ascending]
+        zeros = next(i for i, a in enumerate(coefficients) if a)
+        found = _simple_roots(coefficients[zeros:])
+        return ([(mp.mpc(0), zeros)] if zeros else []) + [(z, 1) for z in found]
+
+
+def _simple_roots(ascending: list[mp.mpf]) -> list[mp.mpc]:
+    """Return the roots by Aberth's iteration from the moduli of the Newton polygon."""
+    degree = len(ascending) - 1
+    points = [(k, mp.log(abs(a))) for k, a in enumerate(ascending) if a]
+    roots, k = [], 0
+    while k < degree:
+        height = dict(points)[k]
+        slope, reached = max(((h - height) / (j - k), j) for j, h in points if j > k)
+        roots += [
+            mp.exp(-slope) * mp.expjpi(2 * mp.mpf(i) / (reached - k) + mp.mpf('0.23') + k)
+            for i in range(reached - k)
+        ]
+        k = reached
+    for _ in range(MAX_SWEEPS):
+        largest = mp.mpf(0)
+        for i, z in enumerate(roots):
+            value, slope = mp.polyval(ascending[::-1], z, derivative=True)
+            if value:
+                newton = value / slope
+                crowd = sum(1 / (z - other) for j, other in enumerate(roots) if j != i)
+                step = newton / (1 - newton * crowd)
+                roots[i] = z - step
+                largest = max(largest, abs(step / z))
+        # Cubic convergence: the step after this one would be below the last digit.
+        if largest < mp.mpf(10) ** (-DIGITS // 2):
+            return roots
+    raise ArithmeticError(f'the roots of {ascending} have not converged')
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceLaw:
+    """
+    Solution of the equation with given ends, in exponentials anchored where they are largest.
+
+    Attributes
+    ----------
+    duration
+        Length of the motion [s].
+    terms
+        Rate [1/s], power, whether counted from the end, weight: weight * u^power * exp(rate u).
+
+    """
+
+    duration: mp.mpf
+    terms: list[tuple[mp.mpc, int, bool, mp.mpc]]
+
+    def jet(self, times, order: int) -> np.ndarray:
+        """Return the derivatives 0 ... order in rows, shape (order + 1, m)."""
+        with mp.workdps(DIGITS):
+            columns = []
+            for t in times:
+                total = [mp.mpc(0)] * (order + 1)
+                for rate, power, from_end, weight in self.terms:
+                    u = mp.mpf(float(t)) - (self.duration if from_end else 0)
+                    for n, value in enumerate(_derivatives(rate, power, u, order)):
+                        total[n] += weight * value
+                columns.append([float(mp.re(value)) for value in total])
+            return np.array(columns).T
+
+
+def solve(roots: Roots, duration: float, start, end) -> ReferenceLaw:
+    """Return the law whose derivatives 0 to 5 are start at 0 and end at the duration."""
+    with mp.workdps(DIGITS):
+        length = mp.mpf(duration)
+        functions = []
+        for z, multiplicity in roots:
+            if z == 0:
+                functions += [(mp.mpc(0), power, False) for power in range(2 * multiplicity)]
+                continue
+            beta = mp.sqrt(mp.mpmathify(z))
+            for power in range(multiplicity):
+                functions += [(beta, power, True), (-beta, power, False)]
+        size = 2 * CONDITIONS
+        matrix, target = mp.matrix(size, size), mp.matrix(size, 1)
+        # Rows and columns in units of the duration, so that the solver's pivots are comparable.
+        for j, (rate, power, from_end) in enumerate(functions):
+            for side, t in enumerate((mp.mpf(0), length)):
+                u = t - (length if from_end else 0)
+                for n, value in enumerate(_derivatives(rate, power, u, CONDITIONS - 1)):
+                    matrix[side * CONDITIONS + n, j] = value * length ** (n - power)
+        for side, ends in enumerate((start, end)):
+            for n, value in enumerate(ends):
+                target[side * CONDITIONS + n] = mp.mpf(float(value)) * length**n
+        weights = mp.lu_solve(matrix, target)
+        return ReferenceLaw(
+            duration=length,
+            terms=[
+                (*function, weight * length ** -function[1])
+                for function, weight in zip(functions, weights, strict=True)
+            ],
+        )
+
+
+def _derivatives(rate: mp.mpc, power: int, u: mp.mpf, order: int) -> list[mp.mpc]:
+    """Return the derivatives 0 ... order of u^power exp(rate u), by Leibniz's rule."""
+    size = mp.exp(rate * u) if rate else mp.mpf(1)
+    if power == 0:
+        return [size * rate**n for n in range(order + 1)]
+    return [
+        size
+        * sum(
+            mp.binomial(n, i) * mp.ff(power, i) * u ** (power - i) * rate ** (n - i)
+            for i in range(min(n, power) + 1)
+        )
+        for n in range(order + 1)
+    ]
