@@ -2,7 +2,7 @@
 Quadratic costs of a motion law; a strategy is nothing but a cost.
 
 J = integral of Y^T Q Y over the motion, Y = (y', y'', ..., y^(6)) and Q66 = 1
-((10) of docs/derivation.md).
+((16) of docs/derivation.md).
 """
 
 from dataclasses import dataclass
@@ -63,8 +63,10 @@ class QuadraticCost:
         matrix.setflags(write=False)
         if matrix.shape != (ORDER, ORDER):
             raise InvalidCost(f'Q must be 6 x 6 (36 numbers), got shape {matrix.shape}')
-        if not np.isfinite(matrix).all():
-            raise InvalidCost('Q must be finite')
+        infinite = np.argwhere(~np.isfinite(matrix))
+        if infinite.size:
+            i, j = infinite[0]
+            raise InvalidCost(f'Q{i + 1}{j + 1} = {matrix[i, j]:g} must be finite')
         if matrix[-1, -1] != 1.0:
             raise InvalidCost(f'Q66 must be 1, got {matrix[-1, -1]:g}')
         _check_semidefinite(matrix)
@@ -81,7 +83,7 @@ class QuadraticCost:
 
         References
         ----------
-        (12) of docs/derivation.md; `eq:ode` of the paper.
+        (21) of docs/derivation.md; `eq:ode` of the paper.
 
         """
         alternating = self.matrix * (-1.0) ** np.arange(1, ORDER + 1)[:, None]
@@ -122,7 +124,7 @@ def strategy_cost(
 
     References
     ----------
-    (13) to (15) of docs/derivation.md; `eq:mintau`, `eq:minpot` of the paper.
+    (17) to (19) of docs/derivation.md; `eq:mintau`, `eq:minpot` of the paper.
 
     """
     for name, weight in (('r', r), ('p', p)):

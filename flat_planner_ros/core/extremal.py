@@ -108,7 +108,7 @@ def conserved_momentum(coefficients: FloatArray, law: MotionLaw, t: FloatArray) 
     Return the first integral -sum_k a_k y^(2k - 1) of the Euler-Lagrange equation.
 
     Constant along an extremal; times the distance it is the cost of a rest-to-rest motion
-    ((22) of docs/derivation.md), shape of t.
+    ((35) of docs/derivation.md), shape of t.
 
     """
     orders = 2 * np.arange(1, CONDITIONS + 1) - 1

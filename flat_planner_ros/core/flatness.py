@@ -70,7 +70,7 @@ def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.APPROXIMATE) -> FlatMa
 
     References
     ----------
-    Equations (8) and (9) of docs/derivation.md; `eq:qn` and `eq:tau` of the paper.
+    Equations (11) and (12) of docs/derivation.md; `eq:qn` and `eq:tau` of the paper.
 
     """
     arm.check_flat()

@@ -235,7 +235,7 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
     if point.effort:
         raise RequestRejected(
             Reason.EFFORT_NOT_ALLOWED,
-            f'point {index} has effort; the planner computes it, leave it empty',
+            f'point {index} has {len(point.effort)} efforts; the planner computes them, leave them out',
             value=float(len(point.effort)),
             limit=0.0,
             time=point.time,

@@ -2,7 +2,7 @@
 Motion law: the planned function of time, and every derivative of it, as a sum of modes.
 
 A mode is an exponential (growing or decaying, perhaps oscillating) times a polynomial: the general
-solution of a linear equation with constant coefficients ((17) of docs/derivation.md).
+solution of a linear equation with constant coefficients ((24) of docs/derivation.md).
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The life of a node's process: start, spin, and an end that tells what was wrong in one line."""
+"""The life of a process of nodes: start, spin, and a clear end."""
 
 from collections.abc import Callable, Sequence
 import sys
@@ -6,42 +6,46 @@ import sys
 from flat_planner_ros.core import FlatPlannerError
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 
-def run(create: Callable[[], Node], args: Sequence[str] | None = None) -> int:
+def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = None) -> int:
     """
-    Spin a node until it is interrupted.
+    Spin nodes in one process until it is interrupted.
 
     Parameters
     ----------
-    create
-        Makes the node in the default context.
+    creators
+        Each makes a node in the default context.
     args
         Command line; the process's own by default.
 
     Returns
     -------
     int
-        Exit code: 0 after Ctrl-C, SIGTERM or a shutdown of the context, 1 if the node could not
+        Exit code: 0 after Ctrl-C, SIGTERM or a shutdown of the context, 1 if a node could not
         start with what it was given.
 
     """
-    node = None
+    nodes: list[Node] = []
     try:
         # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
         try:
             rclpy.init(args=args)
-            node = create()
+            for create in creators:
+                nodes.append(create())
         except (FlatPlannerError, ParameterException, RuntimeError) as error:
             print(f'cannot start: {" ".join(str(error).split())}', file=sys.stderr)
             return 1
-        rclpy.spin(node)
+        executor = SingleThreadedExecutor()
+        for node in nodes:
+            executor.add_node(node)
+        executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
-        if node is not None:
+        for node in nodes:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0

@@ -153,7 +153,7 @@ class PlannerNode(Node):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the planner node."""
-    return run(PlannerNode, args)
+    return run([PlannerNode], args)
 
 
 if __name__ == '__main__':
