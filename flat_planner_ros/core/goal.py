@@ -235,7 +235,8 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
     if point.effort:
         raise RequestRejected(
             Reason.EFFORT_NOT_ALLOWED,
-            f'point {index} has {len(point.effort)} efforts; the planner computes them, leave them out',
+            f'point {index} has {len(point.effort)} efforts; leave them out, the planner computes '
+            f'them',
             value=float(len(point.effort)),
             limit=0.0,
             time=point.time,

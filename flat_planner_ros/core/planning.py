@@ -36,7 +36,7 @@ PROBES = 17
 PROBE_DEPTH = 36
 """Halvings of the distance to either end at which a law is certified."""
 
-NODES_PER_PANEL = 10
+NODES_PER_PANEL = 16
 """Gauss-Legendre nodes on each panel of the quadrature of the effort."""
 
 MIN_PANELS = 16
@@ -307,7 +307,7 @@ def _certify(quantity: str, residual: float, tolerance: float) -> None:
 
 def _probes(duration: float) -> FloatArray:
     """Return times that crowd towards both ends as fast as boundary layers can."""
-    layers = 0.5 ** np.arange(1.0, PROBE_DEPTH)
+    layers = 0.5 ** np.arange(1.0, PROBE_DEPTH + 1.0)
     inner = np.linspace(0.0, 1.0, PROBES)
     return duration * np.unique(np.concatenate([inner, layers, 1.0 - layers]))
 

@@ -116,6 +116,9 @@ def _refined(
     """
     if len(group) == 0:
         return np.ones(1)
+    if len(group) == len(squares):
+        # Exact: rebuilt from its roots, the factor would lose its smallest coefficients.
+        return ascending[::-1].copy()
     scale = np.abs(squares[group]).max()
     inside, outside = squares[group] / scale, np.delete(squares, group) / scale
     factor = np.poly(inside).astype(complex)

@@ -146,9 +146,12 @@ class NodeParameters(Generic[Settings]):
         self._build = build
         self._apply = apply
         _report_unknown(node, list(self._rows))
+        defaults = _model_defaults(node)
         for row in rows:
-            _declare(node, row)
+            _declare(node, row, defaults.get(row.name, row.default))
         self.settings = self._checked({})
+        if defaults:
+            node.get_logger().info("no model is given: this is the paper's arm")
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._changed)
 
@@ -242,8 +245,6 @@ def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
         Its numbers are not those of a flat arm.
 
     """
-    if not any(name == 'joints' or name.startswith('model.') for name in values):
-        values = {**values, **EXAMPLE_ARM}
     joints = tuple(values.get('joints', ()))
     if len(joints) < 2:
         raise InvalidParameter(
@@ -309,14 +310,21 @@ def _required(values: Values, name: str) -> Any:
     return values[name]
 
 
-def _declare(node: Node, row: Row) -> None:
+def _model_defaults(node: Node) -> Values:
+    """Return the example arm for a node that is given nothing of a model, else nothing."""
+    if any(name == 'joints' or name.startswith('model.') for name in node._parameter_overrides):
+        return {}
+    return EXAMPLE_ARM
+
+
+def _declare(node: Node, row: Row, default: Any) -> None:
     """Declare one parameter and put the middleware's complaint about its type into words."""
     try:
-        node.declare_parameter(row.name, row.default, row.descriptor())
+        node.declare_parameter(row.name, default, row.descriptor())
     except InvalidParameterTypeException as error:
-        expected = row.default if isinstance(row.default, Parameter.Type) else None
-        if expected is None:
-            expected = Parameter.Type.from_parameter_value(row.default)
+        expected = row.default
+        if not isinstance(expected, Parameter.Type):
+            expected = Parameter.Type.from_parameter_value(expected)
         raise InvalidParameter(
             f'{row.name} must be of type {expected.name.lower().replace("_", " ")}'
             f'{TYPE_HINTS.get(expected, "")}, got {node._parameter_overrides[row.name].value!r}'

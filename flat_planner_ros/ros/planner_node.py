@@ -32,7 +32,7 @@ class PlannerNode(Node):
     def __init__(self, **options: object) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.PLANNER, **options)
-        self._parameters = NodeParameters(self, ROWS, build, self._apply)
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         publish = self.create_publisher
         self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
@@ -51,7 +51,7 @@ class PlannerNode(Node):
     @property
     def _settings(self) -> PlannerSettings:
         """Return the settings in force."""
-        return self._parameters.settings
+        return self._configuration.settings
 
     @property
     def _joints(self) -> Sequence[str]:
@@ -147,8 +147,11 @@ class PlannerNode(Node):
     def _publish_status(self, status: DiagnosticStatus) -> None:
         """Publish and log a verdict."""
         self._status.publish(diagnostics.array_of(status, self._now()))
-        log = self.get_logger()
-        (log.info if status.level == DiagnosticStatus.OK else log.error)(status.message)
+        # Two calls: a logger refuses another severity from the same line.
+        if status.level == DiagnosticStatus.OK:
+            self.get_logger().info(status.message)
+        else:
+            self.get_logger().error(status.message)
 
 
 def main(args: Sequence[str] | None = None) -> int:

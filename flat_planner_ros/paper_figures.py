@@ -1,0 +1,67 @@
+"""The paper's figures, drawn with matplotlib (extra `plot`)."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flat_planner_ros.paper_example import DURATION, Result, SCENARIOS
+
+SHOWN_AFTER = 1.0
+"""Time that is drawn after the end of the motion [s]."""
+
+STYLES = {
+    'polynomial': ('C0', '-'),
+    'min_control_effort': ('C3', '--'),
+    'min_potential_energy': ('C2', ':'),
+}
+"""Colour and line of each strategy, as in the paper."""
+
+ROWS = ('$q_1$ [rad]', '$q_2$ [rad]', r'$\tau_1$ [N m]')
+
+
+def draw(results: Sequence[Result], path: Path) -> None:
+    """
+    Draw q1, q2 and the effort over time, one column per scenario.
+
+    Parameters
+    ----------
+    results
+        Any of the nine runs.
+    path
+        File to write; its suffix chooses the format.
+
+    Raises
+    ------
+    ImportError
+        matplotlib is not installed.
+
+    """
+    import matplotlib as mpl
+
+    mpl.use('Agg')  # A terminal without a display is enough.
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(
+        len(ROWS), len(SCENARIOS), figsize=(13.0, 7.5), sharex=True, sharey='row', squeeze=False
+    )
+    for column, scenario in enumerate(SCENARIOS):
+        axes[0, column].set_title(f'Scenario {scenario.number}: {scenario.title}', fontsize=10)
+        for result in results:
+            if result.scenario != scenario:
+                continue
+            colour, line = STYLES[result.strategy]
+            times, positions, efforts = result.recording
+            for row, values in enumerate((positions[:, 0], positions[:, 1], efforts)):
+                axes[row, column].plot(times, values, line, color=colour, label=result.strategy)
+        for row, label in enumerate(ROWS):
+            axis = axes[row, column]
+            axis.axvline(DURATION, color='black', linewidth=0.8)
+            axis.grid(alpha=0.3)
+            if column == 0:
+                axis.set_ylabel(label)
+        axes[-1, column].set_xlabel('time [s]')
+        axes[-1, column].set_xlim(0.0, DURATION + SHOWN_AFTER)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc='lower center', ncols=len(STYLES), frameon=False)
+    figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
+    figure.savefig(path, dpi=120)
+    plt.close(figure)

@@ -1,0 +1,248 @@
+"""The paper's experiment, carried out on the three nodes by topics, services and parameters."""
+
+from collections.abc import Callable, Sequence
+from subprocess import Popen
+from time import monotonic
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.paper_example import DURATION, GOAL_ANGLE, Recording, Result, Scenario
+from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros.parameters import EXAMPLE_ARM
+import numpy as np
+from numpy.typing import NDArray
+from rcl_interfaces.srv import SetParametersAtomically
+import rclpy
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from scipy.integrate import trapezoid
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+LEAD = 0.3
+"""From sending a goal to the start of its motion, in real time [s]."""
+
+DISCOVERY = 1.5
+"""Time given to nodes that already run to be discovered [s]."""
+
+PATIENCE = 60.0
+"""Real time that a step of the experiment may take [s]."""
+
+ATTEMPTS = 4
+"""Runs of one case until the plant played the command from its first point on."""
+
+PLAYED_TOLERANCE = 1e-3
+"""Largest difference of applied and planned effort in a valid run, relative to the peak [-]."""
+
+OURS = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
+"""The nodes that take part."""
+
+
+class ExperimentFailed(Exception):
+    """The experiment cannot go on; the message says why."""
+
+
+class Experimenter(Node):
+    """
+    Talks to the three nodes as any user does.
+
+    Parameters
+    ----------
+    speed
+        Simulated seconds per second.
+    processes
+        Those of the nodes; the experiment ends when one of them does.
+
+    """
+
+    def __init__(self, speed: float, processes: Sequence[Popen]) -> None:
+        """Open the topics and services of the three nodes."""
+        super().__init__('paper_table')
+        self._lead = LEAD * max(speed, 1.0)
+        self._processes = processes
+        self._states: list[JointState] = []
+        self._plans: list[JointTrajectory] = []
+        self._verdicts: list[DiagnosticArray] = []
+        self._reports: list[DiagnosticArray] = []
+        planner, plant, monitor = OURS
+        goal, plan = (interfaces.of(planner, t) for t in (interfaces.GOAL, interfaces.PLAN))
+        status = interfaces.of(planner, interfaces.STATUS)
+        report = interfaces.of(monitor, interfaces.REPORT)
+        self._goals = self.create_publisher(JointTrajectory, goal, interfaces.RELIABLE)
+        for kind, name, heard, quality in (
+            (JointState, interfaces.JOINT_STATES, self._states, interfaces.RELIABLE),
+            (JointTrajectory, plan, self._plans, interfaces.LATCHED),
+            (DiagnosticArray, status, self._verdicts, interfaces.LATCHED_HISTORY),
+            (DiagnosticArray, report, self._reports, interfaces.LATCHED),
+        ):
+            self.create_subscription(kind, name, heard.append, quality)
+        self._setters = {
+            name: self.create_client(SetParametersAtomically, f'{name}/set_parameters_atomically')
+            for name in OURS
+        }
+        self._reset = self.create_client(Trigger, interfaces.of(plant, interfaces.RESET))
+
+    def wait_for_nodes(self) -> None:
+        """Wait until all three nodes answer and hear each other."""
+        planner, plant, monitor = OURS
+        command = interfaces.of(planner, interfaces.COMMAND)
+        plan = interfaces.of(planner, interfaces.PLAN)
+
+        def are_listening() -> bool:
+            listeners = [
+                *self.get_subscriptions_info_by_topic(self.resolve_topic_name(command)),
+                *self.get_subscriptions_info_by_topic(self.resolve_topic_name(plan)),
+                *self.get_subscriptions_info_by_topic(
+                    self.resolve_topic_name(interfaces.JOINT_STATES)
+                ),
+            ]
+            names = [info.node_name for info in listeners]
+            return {plant, monitor, planner} <= set(names) and names.count(monitor) > 1
+
+        self._await(
+            lambda: (
+                all(client.service_is_ready() for client in self._setters.values())
+                and self._reset.service_is_ready()
+                and self._goals.get_subscription_count() > 0
+                and bool(self._states)
+                and are_listening()
+            ),
+            'the three nodes do not find each other',
+        )
+
+    def run(self, scenario: Scenario, strategy: str) -> Result:
+        """
+        Carry out one motion, again if the machine was too busy to play it from the start.
+
+        Raises
+        ------
+        ExperimentFailed
+            A node died, refused something or did not answer.
+
+        """
+        self._configure(scenario, strategy)
+        for _ in range(ATTEMPTS):
+            result = self._attempt(scenario, strategy)
+            if result is not None:
+                return result
+            self._lead *= 2.0
+        raise ExperimentFailed(f'{ATTEMPTS} times the command came too late: the machine is busy')
+
+    def _configure(self, scenario: Scenario, strategy: str) -> None:
+        """Set the strategy, what the planner knows of the damping, and the plant's mismatch."""
+        planner, plant, monitor = OURS
+        damping = scenario.damping_factor * EXAMPLE_ARM['model.damping']
+        self._set(planner, {'strategy': strategy, 'model.damping': damping})
+        self._set(monitor, {'model.damping': damping})
+        mismatch = {
+            'mismatch.stiffness_scale': scenario.stiffness_scale,
+            'mismatch.damping_scale': scenario.damping_scale,
+        }
+        self._set(plant, mismatch)
+
+    def _set(self, node: str, values: dict[str, Any]) -> None:
+        """Set parameters of a node, all or none."""
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        request = SetParametersAtomically.Request(
+            parameters=[parameter.to_parameter_msg() for parameter in parameters]
+        )
+        answer = self._call(self._setters[node], request).result
+        if not answer.successful:
+            raise ExperimentFailed(f'{node} refused its parameters: {answer.reason}')
+
+    def _attempt(self, scenario: Scenario, strategy: str) -> Result | None:
+        """Carry out one motion from rest; None if the plant did not play it as planned."""
+        self._call(self._reset, Trigger.Request())
+        for heard in (self._states, self._verdicts, self._plans, self._reports):
+            heard.clear()
+        self._await(lambda: bool(self._states), 'no joint states')
+        start = conversions.seconds(self._states[-1].header.stamp) + self._lead
+        self._goals.publish(_goal(start))
+        self._await(lambda: bool(self._verdicts), 'no verdict on the goal')
+        verdict = self._verdicts[0].status[0]
+        values = {pair.key: pair.value for pair in verdict.values}
+        if values.get('error_name') == 'OLD_HEADER_TIMESTAMP':
+            return None
+        if values['state'] != 'ACCEPTED':
+            raise ExperimentFailed(f'the goal was rejected: {verdict.message}')
+        self._await(lambda: bool(self._plans and self._reports), 'no report')
+        report = self._reports[0].status[0]
+        values = {pair.key: pair.value for pair in report.values}
+        if 'amplitude' not in values:
+            raise ExperimentFailed(f'the report has no amplitude: {report.message}')
+        recording = _recording(self._states, start)
+        times, planned = _planned_efforts(self._plans[0])
+        applied = np.interp(times, recording.times, recording.efforts)
+        if np.abs(applied - planned).max() > PLAYED_TOLERANCE * np.abs(planned).max():
+            return None
+        rms = float(np.sqrt(trapezoid(planned**2, times) / DURATION))
+        return Result(scenario, strategy, rms, float(values['amplitude']), recording)
+
+    def _call(self, client: Client, request: Any) -> Any:
+        """Return the answer of a service."""
+        future = client.call_async(request)
+        self._await(future.done, f'{client.srv_name} does not answer')
+        return future.result()
+
+    def _await(self, condition: Callable[[], bool], complaint: str) -> None:
+        """Spin until a condition holds, a node has died or patience has ended."""
+        deadline = monotonic() + PATIENCE
+        while not condition():
+            if any(process.poll() is not None for process in self._processes):
+                raise ExperimentFailed('one of the three nodes has ended')
+            if monotonic() > deadline:
+                raise ExperimentFailed(f'{complaint} within {PATIENCE:g} s')
+            rclpy.spin_once(self, timeout_sec=0.1)
+
+
+def refuse_company() -> None:
+    """
+    Make sure that none of our nodes is running: a goal would reach both.
+
+    Raises
+    ------
+    ExperimentFailed
+        One is.
+
+    """
+    node = Node('paper_table_probe')
+    deadline = monotonic() + DISCOVERY
+    try:
+        while monotonic() < deadline:
+            rclpy.spin_once(node, timeout_sec=0.1)
+            present = sorted(set(OURS) & set(node.get_node_names()))
+            if present:
+                raise ExperimentFailed(
+                    f'{", ".join(present)} already runs here: stop it, or choose another '
+                    f'ROS_DOMAIN_ID for the experiment'
+                )
+    finally:
+        node.destroy_node()
+
+
+def _goal(start: float) -> JointTrajectory:
+    """Return the goal of the example with its absolute start [s]."""
+    point = JointTrajectoryPoint(
+        positions=[float(GOAL_ANGLE)], time_from_start=conversions.duration_msg(DURATION)
+    )
+    goal = JointTrajectory(joint_names=[EXAMPLE_ARM['joints'][0]], points=[point])
+    goal.header.stamp = conversions.time_msg(start)
+    return goal
+
+
+def _recording(states: Sequence[JointState], start: float) -> Recording:
+    """Return the joint states of one run on the time axis of its motion."""
+    samples = [conversions.sample_from_joint_state(s, EXAMPLE_ARM['joints']) for s in states]
+    return Recording(
+        times=np.array([sample.time for sample in samples]) - start,
+        positions=np.array([sample.positions for sample in samples]),
+        efforts=np.array([sample.efforts[0] for sample in samples]),
+    )
+
+
+def _planned_efforts(plan: JointTrajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return times [s] and efforts of joint 1 [N m]."""
+    motion = conversions.planned_motion_from_trajectory(plan)
+    return motion.times, motion.efforts[:, 0]
