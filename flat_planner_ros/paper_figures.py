@@ -8,6 +8,9 @@ from flat_planner_ros.paper_example import DURATION, Result, SCENARIOS
 SHOWN_AFTER = 1.0
 """Time that is drawn after the end of the motion [s]."""
 
+TICKS = 0.5
+"""Spacing of the marks on the time axis [s]."""
+
 STYLES = {
     'polynomial': ('C0', '-'),
     'min_control_effort': ('C3', '--'),
@@ -60,6 +63,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
                 axis.set_ylabel(label)
         axes[-1, column].set_xlabel('time [s]')
         axes[-1, column].set_xlim(0.0, DURATION + SHOWN_AFTER)
+        axes[-1, column].xaxis.set_major_locator(plt.MultipleLocator(TICKS))
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc='lower center', ncols=len(STYLES), frameon=False)
     figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))

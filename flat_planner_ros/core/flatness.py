@@ -23,6 +23,9 @@ class FlatModel(Enum):
     APPROXIMATE = 'approximate'
     """The paper's first-order Taylor expansion of the damping term: w = y1."""
 
+    EXACT = 'exact'
+    """No approximation: w = z with y1 = z + (c_n / k_n) dz/dt, which the damped spring solves."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlatMap:
@@ -70,7 +73,7 @@ def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.APPROXIMATE) -> FlatMa
 
     References
     ----------
-    Equations (11) and (12) of docs/derivation.md; `eq:qn` and `eq:tau` of the paper.
+    Equations (11) to (13) of docs/derivation.md; `eq:qn` and `eq:tau` of the paper.
 
     """
     arm.check_flat()
@@ -78,6 +81,12 @@ def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.APPROXIMATE) -> FlatMa
     k, relaxation = arm.stiffness, arm.damping / arm.stiffness
     compliance = last / k
     coupling = (inner - last) * compliance
+    if model is FlatModel.EXACT:
+        return FlatMap(
+            output=np.array([1.0, relaxation]),
+            deflection=np.array([0.0, 0.0, -compliance]),
+            effort=np.array([0.0, 0.0, inner, inner * relaxation, coupling]),
+        )
     return FlatMap(
         output=np.array([1.0]),
         deflection=np.array([0.0, 0.0, -compliance, compliance * relaxation]),

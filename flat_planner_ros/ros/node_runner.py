@@ -44,6 +44,10 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except RuntimeError:
+        # A signal may end the context in the middle of a callback, which then fails to publish.
+        if rclpy.ok():
+            raise
     finally:
         for node in nodes:
             node.destroy_node()
