@@ -8,6 +8,7 @@ equal roots cost digits, of which there are plenty.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb, perm
 
 import mpmath as mp
 import numpy as np
@@ -78,7 +79,7 @@ def _simple_roots(ascending: list[mp.mpf]) -> list[mp.mpc]:
     for _ in range(MAX_SWEEPS):
         largest = mp.mpf(0)
         for i, z in enumerate(roots):
-            value, slope = mp.polyval(ascending[::-1], z, derivative=True)
+            value, slope = _value_and_slope(ascending, z)
             if value:
                 newton = value / slope
                 crowd = sum(1 / (z - other) for j, other in enumerate(roots) if j != i)
@@ -89,6 +90,15 @@ def _simple_roots(ascending: list[mp.mpf]) -> list[mp.mpc]:
         if largest < mp.mpf(10) ** (-DIGITS // 2):
             return roots
     raise ArithmeticError(f'the roots of {ascending} have not converged')
+
+
+def _value_and_slope(ascending: list[mp.mpf], z: mp.mpc) -> tuple[mp.mpc, mp.mpc]:
+    """Return a polynomial and its derivative by Horner's rule."""
+    value, slope = mp.mpc(0), mp.mpc(0)
+    for a in reversed(ascending):
+        slope = slope * z + value
+        value = value * z + a
+    return value, slope
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,14 +167,15 @@ def solve(roots: Roots, duration: float, start, end) -> ReferenceLaw:
 
 def _derivatives(rate: mp.mpc, power: int, u: mp.mpf, order: int) -> list[mp.mpc]:
     """Return the derivatives 0 ... order of u^power exp(rate u), by Leibniz's rule."""
-    size = mp.exp(rate * u) if rate else mp.mpf(1)
+    powers = [perm(power, n) * u ** max(power - n, 0) for n in range(min(order, power) + 1)]
+    if not rate:
+        return powers + [mp.mpf(0)] * (order + 1 - len(powers))
+    exponentials = [mp.exp(rate * u)]
+    for _ in range(order):
+        exponentials.append(exponentials[-1] * rate)
     if power == 0:
-        return [size * rate**n for n in range(order + 1)]
+        return exponentials
     return [
-        size
-        * sum(
-            mp.binomial(n, i) * mp.ff(power, i) * u ** (power - i) * rate ** (n - i)
-            for i in range(min(n, power) + 1)
-        )
+        sum(comb(n, i) * p * exponentials[n - i] for i, p in enumerate(powers[: n + 1]))
         for n in range(order + 1)
     ]

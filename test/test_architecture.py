@@ -23,6 +23,8 @@ MAY_IMPORT = {
     'arm': 'errors',
     # the plant
     'simulation': 'arm errors',
+    'sensing': 'simulation errors',
+    'pacing': 'sensing simulation arm errors',
     # the monitor
     'oscillation_search': 'errors',
     'oscillation': 'oscillation_search errors',

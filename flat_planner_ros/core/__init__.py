@@ -16,7 +16,9 @@ from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected,
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
+from flat_planner_ros.core.pacing import PacedArm, SimulationSettings
 from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
 from flat_planner_ros.core.simulation import ArmState, EffortProfile, rollout, SimulatedArm
 from flat_planner_ros.core.vibration import VibrationMonitor
@@ -45,6 +47,7 @@ __all__ = [
     'NaturalMode',
     'NotFlat',
     'OscillationFit',
+    'PacedArm',
     'Plan',
     'plan',
     'PlanarArm',
@@ -59,8 +62,10 @@ __all__ = [
     'rest_target',
     'rollout',
     'select',
+    'Sensing',
     'SessionSettings',
     'SimulatedArm',
+    'SimulationSettings',
     'StartSource',
     'Strategy',
     'strategy_cost',

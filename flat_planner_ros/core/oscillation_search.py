@@ -11,7 +11,7 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 from scipy.optimize import least_squares
 
@@ -32,17 +32,14 @@ DAMPING_LIMIT = 2.0
 NYQUIST_SHARE = 0.95
 """Highest frequency of a fit relative to half the median sampling rate [-]."""
 
-START_DAMPING = (0.0, 0.01, 0.05, 0.2)
-"""Decays tried at the peaks of the spectrum, relative to the angular frequency [-]."""
-
 SPECTRUM_SAMPLES = 2**15
 """Most samples of the resampled signal behind the spectrum [-]."""
 
 SPECTRUM_PADDING = 4
 """Zero padding of the spectrum relative to the signal's length [-]."""
 
-CANDIDATES = 3
-"""Number of peaks of the spectrum tried, and of frequencies refined [-]."""
+CANDIDATES = 2
+"""Number of the spectrum's peaks from which the fit is started [-]."""
 
 FIT_TOLERANCE = 1e-13
 """Relative change of cost and unknowns at which the fit ends [-]."""
@@ -51,13 +48,11 @@ MAX_EVALUATIONS = 60
 """Most evaluations of one refinement [-]."""
 
 
-def basis_columns(u: Array, rates: ArrayLike) -> Array:
-    """Return the linear unknowns' columns for rates (w, s) per unit of u: (..., m, 4)."""
-    w, s = np.moveaxis(np.asarray(rates, dtype=float), -1, 0)[..., None]
-    phase = w * u
+def basis_columns(u: Array, rates: Array) -> Array:
+    """Return the linear unknowns' columns for rates (w, s) per unit of u: (m, 4)."""
+    w, s = rates
     envelope = np.exp(-s * u)
-    line = np.broadcast_to(u - 0.5, phase.shape)
-    columns = (np.ones_like(phase), line, envelope * np.cos(phase), envelope * np.sin(phase))
+    columns = (np.ones_like(u), u - 0.5, envelope * np.cos(w * u), envelope * np.sin(w * u))
     return np.stack(columns, axis=-1)
 
 
@@ -76,28 +71,8 @@ def solve_linear(basis: Array, y: Array) -> tuple[Array, Array]:
     return q, np.linalg.solve(r, q.T @ y)
 
 
-def _misfit(u: Array, y: Array, rates: Array) -> Array:
-    """Return the sum of squares that the best linear unknowns leave, rates (c, 2) -> (c,)."""
-    basis = basis_columns(u, rates)  # (c, m, 4)
-    transposed = np.swapaxes(basis, -1, -2)
-    moments = transposed @ y  # (c, 4)
-    # A trace of ridge: near the Nyquist frequency columns can coincide.
-    gram = transposed @ basis + ROUNDOFF * y.size * np.eye(4)
-    linear = np.linalg.solve(gram, moments[..., None])[..., 0]
-    misfit: Array = y @ y - np.einsum('ci,ci->c', moments, linear)
-    return misfit
-
-
-def _best(u: Array, y: Array, rates: Array) -> Array:
-    """Return the few best rates with different w, best first, shape (<= CANDIDATES, 2)."""
-    ranked = rates[np.argsort(_misfit(u, y, rates))]
-    _, first = np.unique(ranked[:, 0], return_index=True)
-    best: Array = ranked[np.sort(first)[:CANDIDATES]]
-    return best
-
-
 def _starts(u: Array, y: Array) -> Array:
-    """Return starts at the highest peaks of the resampled signal's spectrum: (c, 2)."""
+    """Return undamped starts at the highest peaks of the resampled signal's spectrum: (c, 2)."""
     count = int(min(round(1.0 / float(np.median(np.diff(u)))) + 1, SPECTRUM_SAMPLES))
     grid = np.linspace(0.0, 1.0, count)
     signal = np.interp(grid, u, y)
@@ -108,9 +83,7 @@ def _starts(u: Array, y: Array) -> Array:
     peaks = peaks[np.argsort(-power[peaks])][:CANDIDATES]
     # One period besides: the trend may have taken the only peak.
     w = 2 * pi * np.append(peaks * (count - 1) / length, 1.0)
-    return np.stack(
-        (np.repeat(w, len(START_DAMPING)), np.outer(w, START_DAMPING).ravel()), axis=-1
-    )
+    return np.stack((w, np.zeros_like(w)), axis=-1)
 
 
 def best_rates(u: Array, y: Array) -> Array:
@@ -134,7 +107,7 @@ def best_rates(u: Array, y: Array) -> Array:
     lower = np.array((2 * pi * SEARCH_PERIODS, -GROWTH_LIMIT))
     upper = np.array((highest, DAMPING_LIMIT * highest))
     starts = np.clip(_starts(u, y), lower, upper)
-    results = [_descend(u, y, start, lower, upper) for start in _best(u, y, starts)]
+    results = [_descend(u, y, start, lower, upper) for start in starts]
     best = min(results, key=lambda result: float(result.cost))
     return np.asarray(best.x, dtype=float)
 

@@ -17,12 +17,14 @@ from flat_planner_ros.core import (
     PlanSamples,
     Reason,
     RequestRejected,
+    Residual,
     select,
 )
 from flat_planner_ros.core.goal import MAX_POINTS
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 FloatArray = NDArray[np.float64]
@@ -107,31 +109,71 @@ def sample_from_joint_state(msg: JointState, joints: Sequence[str]) -> JointSamp
         A joint is missing or the arrays do not fit the names.
 
     """
-    indices = select(msg.name, joints)
-    count = len(msg.name)
-    if len(msg.position) != count:
-        raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
-    return JointSample(
-        time=seconds(msg.header.stamp),
-        positions=np.asarray(msg.position, dtype=float)[indices],
-        velocities=_optional(msg.velocity, count, indices),
-        efforts=_optional(msg.effort, count, indices),
-    )
+    return JointStateReader(joints).read(msg)
+
+
+class JointStateReader:
+    """
+    Reads joint states of a source that names its joints in the same order every time.
+
+    Names are looked up once, and compared as a whole from then on: at 1 kHz that counts.
+
+    Parameters
+    ----------
+    joints
+        Whose states are wanted, in this order.
+
+    """
+
+    def __init__(self, joints: Sequence[str]) -> None:
+        """Wait for the first message."""
+        self.joints = list(joints)
+        self._names: list[str] | None = None
+        self._indices: NDArray[np.intp] | slice = slice(None)
+
+    def read(self, msg: JointState) -> JointSample:
+        """Return what `sample_from_joint_state` does; its arrays may be views of the message's."""
+        names = msg.name
+        if names != self._names:
+            self._indices = slice(None) if names == self.joints else select(names, self.joints)
+            self._names = names
+        count = len(names)
+        if len(msg.position) != count:
+            raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
+        return JointSample(
+            time=seconds(msg.header.stamp),
+            positions=np.frombuffer(msg.position)[self._indices],
+            velocities=_optional(msg.velocity, count, self._indices),
+            efforts=_optional(msg.effort, count, self._indices),
+        )
+
+
+def is_stamped(msg: JointState) -> bool:
+    """Return whether the message says when it was measured."""
+    stamp = msg.header.stamp
+    return bool(stamp.sec or stamp.nanosec)
 
 
 def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
     """
     Return the motion that a plan states.
 
+    Times are in seconds since the epoch, as stamped. That resolves 0.2 microseconds: it leaves the
+    amplitude of an oscillation within 1e-7 of itself, and residuals during a motion within that
+    time's travel, 1e-6 rad at 6 rad/s.
+
     Raises
     ------
     InvalidRequest
-        The message is no complete, finite motion.
+        The message is no complete, finite motion with an absolute start.
 
     """
+    start = _stamp(msg)
+    if start is None:
+        raise InvalidRequest('a plan needs the absolute time of its start in header.stamp')
     return PlannedMotion(
         joint_names=tuple(msg.joint_names),
-        start=seconds(msg.header.stamp),
+        start=start,
         times=_times(msg),
         positions=_table(msg, 'positions'),
         velocities=_optional_table(msg, 'velocities'),
@@ -224,27 +266,26 @@ def joint_state_msg(state: ArmState, joints: Sequence[str]) -> JointState:
     return _joint_state_msg(joints, state.time, state.position, state.velocity, state.effort)
 
 
-def residual_msg(
-    joints: Sequence[str], time: float, positions: FloatArray, velocities: FloatArray | None
-) -> JointState:
-    """Return deviations of positions and, where measured, velocities."""
-    return _joint_state_msg(joints, time, positions, velocities, None)
+def residual_msg(header: Header, joints: Sequence[str], residual: Residual) -> JointState:
+    """Return deviations of positions and, where measured, velocities, stamped as measured."""
+    msg = JointState(header=header, name=joints, position=_doubles(residual.positions))
+    if residual.velocities is not None:
+        msg.velocity = _doubles(residual.velocities)
+    return msg
 
 
 def _joint_state_msg(
     joints: Sequence[str],
     time: float,
     position: FloatArray,
-    velocity: FloatArray | None,
-    effort: FloatArray | None,
+    velocity: FloatArray,
+    effort: FloatArray,
 ) -> JointState:
-    """Return a joint state with full arrays, or empty ones for what is unknown."""
-    msg = JointState(name=list(joints), position=_doubles(position))
+    """Return a joint state with full arrays."""
+    msg = JointState(name=list(joints))
     msg.header.stamp = time_msg(time)
-    if velocity is not None:
-        msg.velocity = _doubles(velocity)
-    if effort is not None:
-        msg.effort = _doubles(effort)
+    msg.position, msg.velocity = _doubles(position), _doubles(velocity)
+    msg.effort = _doubles(effort)
     return msg
 
 
@@ -294,8 +335,8 @@ def _optional_table(msg: JointTrajectory, field: str) -> FloatArray | None:
     return _table(msg, field)
 
 
-def _optional(values: Sequence[float], count: int, indices: NDArray[np.intp]) -> FloatArray | None:
+def _optional(values: array, count: int, indices: NDArray[np.intp] | slice) -> FloatArray | None:
     """Return the wanted entries of an array that may be empty."""
     if len(values) != count:
         return None
-    return np.asarray(values, dtype=float)[indices]
+    return np.frombuffer(values)[indices]

@@ -3,15 +3,23 @@
 from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flat_planner_ros.core import Goal, Motion, RequestRejected
+from flat_planner_ros.core import Goal, Level, Motion, RequestRejected, VibrationReport
 from flat_planner_ros.ros.conversions import time_msg
-from flat_planner_ros.ros.interfaces import ERROR_CODES, STATUS_NAME
+from flat_planner_ros.ros.interfaces import ERROR_CODES, REPORT_NAME, STATUS_NAME
 
 ECHO_LENGTH = 16
 """Most entries of a goal's list that a verdict repeats."""
 
 ECHO_CHARACTERS = 64
 """Most characters of an entry that a verdict repeats."""
+
+LEVELS = {
+    Level.OK: DiagnosticStatus.OK,
+    Level.WARN: DiagnosticStatus.WARN,
+    Level.ERROR: DiagnosticStatus.ERROR,
+    Level.STALE: DiagnosticStatus.STALE,
+}
+"""Levels of a report as diagnostics state them."""
 
 Values = Mapping[str, float | int | str | None]
 """Keys and values of a status; None for what is not known."""
@@ -68,8 +76,7 @@ def accepted_status(
         'cost': plan.cost_value,
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
-        for joint, value in zip(joints, getattr(plan, quantity).tolist(), strict=True):
-            values[f'{quantity}.{joint}'] = value
+        values.update(_per_joint(quantity, joints, getattr(plan, quantity).tolist()))
     return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, {**values, **_echo(goal)})
 
 
@@ -93,6 +100,64 @@ def finished_status(motion: Motion) -> DiagnosticStatus:
     message = f'plan {motion.plan_id} finished after {motion.plan.request.duration:g} s'
     values = _of_motion(motion, 'FINISHED')
     return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
+
+
+def report_status(report: VibrationReport) -> DiagnosticStatus:
+    """Return what a motion has left behind."""
+    return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _of_report(report))
+
+
+def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> DiagnosticStatus:
+    """
+    Return the present state of a monitor.
+
+    Parameters
+    ----------
+    report
+        The last one, ``None`` before the first.
+    phase
+        What the monitor is waiting for.
+    dropped
+        Number of unusable samples [-].
+
+    """
+    state: Values = {'phase': phase, 'dropped_samples': dropped}
+    if report is None:
+        message = f'{phase}: no motion has been judged yet'
+        return status_msg(REPORT_NAME, DiagnosticStatus.OK, message, state)
+    message = f'{phase}; last motion: {report.message}'
+    return status_msg(REPORT_NAME, LEVELS[report.level], message, {**state, **_of_report(report)})
+
+
+def _of_report(report: VibrationReport) -> Values:
+    """Return the numbers of a report."""
+    seen = report.samples > 0
+    return {
+        'start_time': f'{report.start_time:.9f}',
+        'end_time': f'{report.end_time:.9f}',
+        'joint': report.joint,
+        'amplitude': report.amplitude,
+        'peak_to_peak': report.peak_to_peak,
+        'frequency': report.frequency,
+        'frequency_expected': report.frequency_expected,
+        'damping_ratio': report.damping_ratio,
+        'damping_expected': report.damping_expected,
+        'settling_time': report.settling_time,
+        'settled': report.settled if seen else None,
+        'bias': report.bias,
+        **_per_joint('final_error', report.joint_names, report.final_error),
+        **_per_joint('rms_effort', report.joint_names, report.rms_effort),
+        'window': report.window if seen else None,
+        'samples': report.samples,
+        'fit_rms': report.fit_rms,
+    }
+
+
+def _per_joint(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:
+    """Return a quantity of each joint, or of none."""
+    if not values:
+        return {}
+    return {f'{quantity}.{j}': value for j, value in zip(joints, values, strict=True)}
 
 
 def _of_motion(motion: Motion, state: str) -> Values:

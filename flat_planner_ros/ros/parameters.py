@@ -9,7 +9,7 @@ change at run time, so that a node never holds settings that it could not have s
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from math import inf, isnan
+from math import inf, isfinite, isnan
 import sys
 from typing import Any, Generic, TypeVar
 
@@ -52,6 +52,8 @@ class Row:
         Allowed texts; empty for any.
     read_only
         Whether it is structural, fixed at the start.
+    infinite
+        Whether infinity is allowed, meaning no limit.
 
     """
 
@@ -62,6 +64,7 @@ class Row:
     upper: float = inf
     choices: tuple[str, ...] = ()
     read_only: bool = False
+    infinite: bool = False
 
     @property
     def constraints(self) -> str:
@@ -105,9 +108,10 @@ class Row:
         for number in numbers:
             if not isinstance(number, float):
                 continue
-            if isnan(number) or not self.lower <= number <= self.upper:
+            is_number = isfinite(number) or (self.infinite and not isnan(number))
+            if not (is_number and self.lower <= number <= self.upper):
                 raise InvalidParameter(
-                    f'{self.name} must be {self.constraints or "a number"}, got {number:g}'
+                    f'{self.name} must be {self.constraints or "finite"}, got {number:g}'
                 )
 
 

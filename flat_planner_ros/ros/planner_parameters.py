@@ -85,21 +85,25 @@ ROWS = [
     Row(
         name='limits.position_min',
         default=Parameter.Type.DOUBLE_ARRAY,
+        infinite=True,
         description='lower position limits per joint [rad]; not yet available',
     ),
     Row(
         name='limits.position_max',
         default=Parameter.Type.DOUBLE_ARRAY,
+        infinite=True,
         description='upper position limits per joint [rad]; not yet available',
     ),
     Row(
         name='limits.velocity',
         default=Parameter.Type.DOUBLE_ARRAY,
+        infinite=True,
         description='velocity limits per joint [rad/s]; not yet available',
     ),
     Row(
         name='limits.effort',
         default=Parameter.Type.DOUBLE_ARRAY,
+        infinite=True,
         description='effort limits per joint [N m]; not yet available',
     ),
     Row(

@@ -187,6 +187,15 @@ def test_any_number_of_samples_and_periods_is_answered():
     assert found > 100
 
 
+def test_a_spike_without_a_peak_in_its_spectrum_is_answered():
+    rng = np.random.default_rng(8)
+    for _ in range(300):
+        times = np.sort(rng.random(14))
+        values = np.where(np.arange(14) == rng.integers(14), 1.0, 0.0)
+        fit = fit_oscillation(times, values, 0.0)
+        assert (fit.frequency is None) == bool(fit.reason)
+
+
 def test_a_gap_and_a_late_start_leave_the_amplitude_at_the_end_of_the_motion():
     elapsed = grid(4.0, 200.0)
     seen = elapsed[(elapsed > 0.4) & ((elapsed < 1.2) | (elapsed > 2.5))]

@@ -1,9 +1,9 @@
-"""A private ROS graph for every test: real nodes, topics and services, in or beside the process."""
+"""A private ROS graph for every test: real nodes, topics and services, and processes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 import os
 from pathlib import Path
 import signal
@@ -33,7 +33,7 @@ DOMAINS = range(50, 100)
 """Domains of tests, above those that people choose by hand and below those without free ports."""
 
 LOCK_PORT = 24100
-"""First of the local TCP ports that processes of tests hold to keep their domains to themselves."""
+"""First of the local TCP ports, one per domain, that keep a domain to one process of tests."""
 
 POLL = 0.02
 """Longest wait between two looks at a condition [s]."""
@@ -58,7 +58,9 @@ class Process:
         self, module: str, arguments: Sequence[str], environment: Mapping[str, str]
     ) -> None:
         """Start it."""
-        self._out, self._err = tempfile.TemporaryFile(), tempfile.TemporaryFile()
+        self._files = files = ExitStack()
+        self._out = files.enter_context(tempfile.TemporaryFile())
+        self._err = files.enter_context(tempfile.TemporaryFile())
         self._popen = subprocess.Popen(
             [sys.executable, '-m', module, *arguments],
             env={**os.environ, **environment},
@@ -104,8 +106,7 @@ class Process:
     def close(self) -> None:
         """Leave nothing behind."""
         self.kill()
-        self._out.close()
-        self._err.close()
+        self._files.close()
 
 
 class Graph:
@@ -213,9 +214,7 @@ class Graph:
             self.executor.spin_once(timeout_sec=min(left, POLL))
         return True
 
-    def expect(
-        self, condition: Callable[[], object], what: str, timeout: float = TIMEOUT
-    ) -> None:
+    def expect(self, condition: Callable[[], object], what: str, timeout: float = TIMEOUT) -> None:
         """Fail with a message unless a condition comes to hold before the deadline."""
         assert self.spin_until(condition, timeout), f'not within {timeout:g} s: {what}'
 

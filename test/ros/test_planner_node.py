@@ -355,7 +355,8 @@ def test_replanning_needs_a_goal_and_stopping_is_refused_in_words(planner, graph
     ('name', 'value', 'text'),
     [
         ('strategy', 'fastest', 'min_control_effort'),
-        ('flat_model', 'exact', 'approximate'),
+        ('flat_model', 'rough', 'approximate'),
+        ('start_delay', inf, 'start_delay'),
         ('weights.r', 2000.0, '1000'),
         ('weights.Q', [1.0], '36'),
         ('model.stiffness', -1.0, 'stiffness'),
@@ -434,7 +435,7 @@ BAD_ARGUMENTS = {
     'half a model': (['-p', 'model.stiffness:=1.0'], 'joints'),
     'three joints': (['-p', 'joints:=[a, b, c]'], 'only 2'),
     'unknown choice': (['-p', 'strategy:=best'], 'one of polynomial'),
-    'not available': (['-p', 'flat_model:=exact'], 'approximate'),
+    'not available': (['-p', 'stream_effort:=true'], 'not available'),
     'range': (['-p', 'sampling.period:=1.0'], 'sampling.period'),
 }
 

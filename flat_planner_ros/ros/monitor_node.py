@@ -1,0 +1,177 @@
+"""Monitor node: what planned motions leave behind, from any source (docs/interfaces.md)."""
+
+from collections.abc import Sequence
+import sys
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core import (
+    FlatPlannerError,
+    MonitorSettings,
+    PlannedMotion,
+    VibrationMonitor,
+    VibrationReport,
+)
+from flat_planner_ros.ros import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.monitor_parameters import build, ROWS
+from flat_planner_ros.ros.node_runner import run
+from flat_planner_ros.ros.parameters import NodeParameters
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+TICK_PERIOD = 0.1
+"""Time between two looks for silence [s]."""
+
+DIAGNOSTICS_PERIOD = 1.0
+"""Time between two messages on `/diagnostics` [s]."""
+
+SAME_CLOCK = 3600.0
+"""Distance of a plan's start from the node's time below which both are of one clock [s]."""
+
+WARNING_PERIOD = 5.0
+"""Shortest time between two warnings about the same input [s]."""
+
+
+class _StampClock:
+    """
+    The time of the joint states' stamps, carried on by the node's clock while none come.
+
+    The two clocks may differ: a simulator or a recording stamps in its own time. Before the first
+    joint state the node's clock stands for both.
+    """
+
+    def __init__(self) -> None:
+        """Wait for the first joint state."""
+        self.stamp: float | None = None
+        self._seen: float | None = None
+        self._offset = 0.0
+
+    def now(self, node_time: float) -> float:
+        """Return the present time of the stamps [s]."""
+        if self.stamp is not None and self.stamp != self._seen:
+            self._seen = self.stamp
+            self._offset = self.stamp - node_time
+        return node_time + self._offset
+
+
+class MonitorNode(Node):
+    """Judges the oscillation after each motion of the latched plan."""
+
+    def __init__(self, **options: object) -> None:
+        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
+        super().__init__(interfaces.MONITOR, **options)
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
+        self._monitor = VibrationMonitor(self._configuration.settings)
+        self._forget()
+        publish = self.create_publisher
+        self._residual = publish(JointState, interfaces.RESIDUAL, interfaces.RELIABLE)
+        self._reports = publish(DiagnosticArray, interfaces.REPORT, interfaces.LATCHED)
+        self._health = publish(DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE)
+        plan = interfaces.of(interfaces.PLANNER, interfaces.PLAN)
+        listen = self.create_subscription
+        listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED)
+        listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        self.create_service(Trigger, interfaces.RESET, self._on_reset)
+        # A simulated clock can stand still; noticing that must not depend on it.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
+
+    def _now(self) -> float:
+        """Return the node's time [s]."""
+        return conversions.seconds(self.get_clock().now().to_msg())
+
+    def _forget(self) -> None:
+        """Wait for a plan, as at the start."""
+        self._monitor.reset()
+        self._stamps = _StampClock()
+        self._reader: conversions.JointStateReader | None = None
+        self._plan: PlannedMotion | None = None
+        self._report: VibrationReport | None = None
+
+    def _apply(self, settings: MonitorSettings) -> None:
+        """Watch the present plan anew, with changed parameters."""
+        self._monitor = VibrationMonitor(settings)
+        if self._plan is not None:
+            self._monitor.plan(self._plan)
+
+    def _on_plan(self, msg: JointTrajectory) -> None:
+        """Take a plan, for whatever joints it names."""
+        try:
+            motion = conversions.planned_motion_from_trajectory(msg)
+        except FlatPlannerError as error:
+            self.get_logger().warning(f'plan ignored: {error}')
+            return
+        if self._plan is None or self._plan.joint_names != motion.joint_names:
+            self._forget()
+            self._reader = conversions.JointStateReader(motion.joint_names)
+        self._plan = motion
+        self._publish_report(self._monitor.plan(motion))
+
+    def _on_measured(self, msg: JointState) -> None:
+        """Take a sample and tell how far it is from the plan."""
+        if self._reader is None:
+            return
+        if not conversions.is_stamped(msg):
+            msg.header.stamp = self.get_clock().now().to_msg()
+        try:
+            sample = self._reader.read(msg)
+            report = self._monitor.add(sample)
+        except FlatPlannerError as error:
+            self.get_logger().warning(
+                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
+            )
+            return
+        self._stamps.stamp = sample.time
+        if self._residual.get_subscription_count():
+            residual = self._monitor.residual(sample)
+            if residual is not None:
+                self._residual.publish(
+                    conversions.residual_msg(msg.header, self._reader.joints, residual)
+                )
+        self._publish_report(report)
+
+    def _on_tick(self) -> None:
+        """Notice silence."""
+        now, plan = self._stamps.now(self._now()), self._plan
+        # The node's own time would end the watch of a plan that is of another clock.
+        is_known = self._stamps.stamp is not None
+        if plan is not None and (is_known or abs(now - plan.start) < SAME_CLOCK):
+            self._publish_report(self._monitor.tick(now))
+
+    def _on_diagnostics(self) -> None:
+        """Publish the present state."""
+        phase, dropped = self._monitor.state.value, self._monitor.dropped
+        status = diagnostics.monitor_status(self._report, phase, dropped)
+        self._health.publish(diagnostics.array_of(status, self._now()))
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Forget plans, samples and the last report."""
+        self._forget()
+        response.success = True
+        response.message = 'waiting for the next plan'
+        return response
+
+    def _publish_report(self, report: VibrationReport | None) -> None:
+        """Publish and log a report, if there is one."""
+        if report is None:
+            return
+        self._report = report
+        status = diagnostics.report_status(report)
+        self._reports.publish(diagnostics.array_of(status, self._stamps.now(self._now())))
+        # One call for both would not do: a place in the code may log at one severity only.
+        if status.level == DiagnosticStatus.OK:
+            self.get_logger().info(status.message)
+        else:
+            self.get_logger().warning(status.message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the monitor node."""
+    return run([MonitorNode], args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

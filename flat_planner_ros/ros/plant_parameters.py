@@ -1,0 +1,199 @@
+"""Parameters of the plant node."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from flat_planner_ros.core import Sensing, SimulationSettings
+from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
+from rclpy.parameter import Parameter
+
+
+class CommandInput(Enum):
+    """What moves the plant."""
+
+    TRAJECTORY = 'trajectory'
+    EFFORT = 'effort'
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantSettings:
+    """
+    What the plant node does.
+
+    Attributes
+    ----------
+    joints
+        Names of the arm's joints, the passive one last.
+    simulation
+        What is simulated.
+    command_input
+        What moves it.
+    publish_clock
+        Whether the simulated time is the graph's time.
+    real_time_factor
+        Simulated seconds per second [-], 0 for as fast as it can; 1 without `publish_clock`.
+
+    """
+
+    joints: tuple[str, ...]
+    simulation: SimulationSettings
+    command_input: CommandInput
+    publish_clock: bool
+    real_time_factor: float
+
+
+DOUBLES = Parameter.Type.DOUBLE_ARRAY
+
+ROWS = [
+    *model_rows(read_only=True),
+    Row(
+        name='publish_rate',
+        default=200.0,
+        description='rate of joint_states and /clock, in simulated time [Hz]',
+        lower=1.0,
+        upper=1000.0,
+        read_only=True,
+    ),
+    Row(
+        name='publish_clock',
+        default=False,
+        description='publish /clock, for nodes with use_sim_time',
+        read_only=True,
+    ),
+    Row(
+        name='real_time_factor',
+        default=1.0,
+        description='speed of /clock [-]; 0 = as fast as it can; only with publish_clock',
+        lower=0.0,
+        upper=1000.0,
+        read_only=True,
+    ),
+    Row(
+        name='initial_position',
+        default=DOUBLES,
+        description='joint angles at the start and after ~/reset [rad]; zeros by default',
+        lower=-1e3,
+        upper=1e3,
+        read_only=True,
+    ),
+    Row(
+        name='integration_step',
+        default=1e-3,
+        description='longest step of the integration [s]; a whole number of them makes a period',
+        lower=1e-5,
+        upper=1e-2,
+        read_only=True,
+    ),
+    Row(
+        name='input',
+        default=CommandInput.TRAJECTORY.value,
+        description='what moves the plant: flat_planner/joint_trajectory or .../effort_commands',
+        choices=tuple(choice.value for choice in CommandInput),
+        read_only=True,
+    ),
+    *(
+        Row(
+            name=f'mismatch.{quantity}_scale',
+            default=1.0,
+            description=f'{quantity} of the plant relative to the nominal model [-]',
+            lower=lower,
+            upper=1e3,
+        )
+        for quantity, lower in (('stiffness', 1e-3), ('damping', 0.0), ('inertia', 1e-3))
+    ),
+    Row(
+        name='torque.saturation',
+        default=DOUBLES,
+        description='largest effort per actuated joint [N m]; none by default',
+        lower=0.0,
+        infinite=True,
+        read_only=True,
+    ),
+    Row(
+        name='noise.position_std',
+        default=0.0,
+        description='standard deviation of the noise on the joint angles shown [rad]',
+        lower=0.0,
+        upper=10.0,
+    ),
+    Row(name='noise.seed', default=0, description='seed of the noise, at least 0'),
+    Row(
+        name='encoder.resolution',
+        default=0.0,
+        description='step of the joint angles shown [rad]; 0 = ideal',
+        lower=0.0,
+        upper=10.0,
+    ),
+    Row(
+        name='feedback.p',
+        default=DOUBLES,
+        description='gain on position errors per actuated joint [N m/rad]; 0 = feed-forward only',
+        lower=0.0,
+        upper=1e6,
+        read_only=True,
+    ),
+    Row(
+        name='feedback.d',
+        default=DOUBLES,
+        description='gain on velocity errors per actuated joint [N m s/rad]',
+        lower=0.0,
+        upper=1e6,
+        read_only=True,
+    ),
+]
+"""All parameters of the plant node."""
+
+
+def build(values: Values) -> PlantSettings:
+    """
+    Return the plant's settings.
+
+    Raises
+    ------
+    FlatPlannerError
+        They contradict each other or the model.
+
+    """
+    joints, arm = arm_of(values)
+    publish_clock, factor = values['publish_clock'], values['real_time_factor']
+    if factor != 1.0 and not publish_clock:
+        raise InvalidParameter(
+            f'real_time_factor {factor:g} needs publish_clock: true; without it the plant follows '
+            'a clock that is not its own'
+        )
+    simulation = SimulationSettings(
+        arm=arm.scaled(
+            stiffness=values['mismatch.stiffness_scale'],
+            damping=values['mismatch.damping_scale'],
+            inertia=values['mismatch.inertia_scale'],
+        ),
+        position=_per_joint(values, 'initial_position', len(joints)) or (0.0,) * len(joints),
+        rate=values['publish_rate'],
+        step=values['integration_step'],
+        saturation=_per_joint(values, 'torque.saturation', len(joints) - 1),
+        feedback_p=_per_joint(values, 'feedback.p', len(joints) - 1),
+        feedback_d=_per_joint(values, 'feedback.d', len(joints) - 1),
+        sensing=Sensing(
+            position_std=values['noise.position_std'],
+            seed=values['noise.seed'],
+            resolution=values['encoder.resolution'],
+        ),
+    )
+    return PlantSettings(
+        joints=joints,
+        simulation=simulation,
+        command_input=CommandInput(values['input']),
+        publish_clock=publish_clock,
+        real_time_factor=factor,
+    )
+
+
+def _per_joint(values: Values, name: str, count: int) -> tuple[float, ...] | None:
+    """Return an array with an entry for each of some joints, None where it is not given."""
+    numbers = values.get(name)
+    if numbers is None:
+        return None
+    if len(numbers) != count:
+        kind = 'actuated joint' if name != 'initial_position' else 'joint'
+        raise InvalidParameter(f'{name} needs one number per {kind}, {count}, got {len(numbers)}')
+    return tuple(numbers)
