@@ -1,7 +1,7 @@
 """Planning, dynamics and judgement of flat elastic arms; free of ROS, files and clocks."""
 
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
-from flat_planner_ros.core.cost import QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
     InvalidCommand,
@@ -12,7 +12,14 @@ from flat_planner_ros.core.errors import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
-from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.goal import (
+    Goal,
+    GoalPoint,
+    MAX_POINTS,
+    Reason,
+    RequestRejected,
+    rest_target,
+)
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
@@ -40,6 +47,8 @@ __all__ = [
     'InvalidRequest',
     'JointSample',
     'Level',
+    'MAX_POINTS',
+    'MAX_WEIGHT',
     'MonitorSettings',
     'Motion',
     'MotionLaw',

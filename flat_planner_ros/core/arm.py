@@ -7,10 +7,18 @@ balanced or not (docs/derivation.md).
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, sqrt
+from math import sqrt
 from typing import NamedTuple, TypeVar
 
 from flat_planner_ros.core.errors import InvalidModel, NotFlat
+from flat_planner_ros.core.links import (
+    chain_load,
+    check_definite,
+    check_realizable,
+    checked_links,
+    checked_vector,
+    per_motor,
+)
 import numpy as np
 import numpy.typing as npt
 
@@ -19,15 +27,6 @@ Real = TypeVar('Real', float, Array)
 
 BALANCE_TOLERANCE = 1e-6
 """Largest static moment of a balanced link, relative to sqrt(carried mass * inertia) [-]."""
-
-DEFINITE_TOLERANCE = 1e-12
-"""Smallest eigenvalue of an admitted inertia matrix scaled to unit diagonal [-]."""
-
-SYMMETRY_TOLERANCE = 1e-12
-"""Largest asymmetry of an admitted inertia matrix scaled to unit diagonal [-]."""
-
-COUPLING_TOLERANCE = 1e-9
-"""Largest miss of h_ij = l_i s_j, relative to sqrt(h_ii h_jj) [-]."""
 
 ROUNDING = 1e-15
 """Coupling of two links that is a rounded zero, relative to their own inertias [-]."""
@@ -80,14 +79,6 @@ class NaturalMode(NamedTuple):
         return self.frequency * sqrt(max(0.0, 1.0 - self.damping_ratio**2))
 
 
-class _Load(NamedTuple):
-    """Inertia (n, n) [kg m^2], static moment (n,) [kg m] and carried mass (n,) [kg]."""
-
-    inertia: Array
-    static_moment: Array
-    carried_mass: Array
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanarArm:
     """
@@ -130,28 +121,28 @@ class PlanarArm:
         n = inertia.shape[0] if inertia.ndim else 0
         if n < 2 or inertia.shape != (n, n):
             raise InvalidModel(f'inertia must be (n, n) with n >= 2, got shape {inertia.shape}')
-        _check_definite(inertia)
+        check_definite(inertia)
         inertia = (inertia + inertia.T) / 2
         inertia.setflags(write=False)
         fields = {
             'inertia': inertia,
-            'static_moment': _vector('static_moment', self.static_moment, n, 'kg m'),
-            'carried_mass': _vector('carried_mass', self.carried_mass, n, 'kg', 0.0),
-            'viscous_friction': _vector(
+            'static_moment': checked_vector('static_moment', self.static_moment, n, 'kg m'),
+            'carried_mass': checked_vector('carried_mass', self.carried_mass, n, 'kg', 0.0),
+            'viscous_friction': checked_vector(
                 'viscous_friction', self.viscous_friction, n - 1, 'N m s/rad', 0.0
             ),
-            'coulomb_friction': _vector(
+            'coulomb_friction': checked_vector(
                 'coulomb_friction', self.coulomb_friction, n - 1, 'N m', 0.0
             ),
         }
         for name, value in fields.items():
             object.__setattr__(self, name, value)
-        _vector('damping', [self.damping], 1, 'N m s/rad', 0.0)
-        _vector('gravity', [self.gravity], 1, 'm/s^2')
-        _vector('stiffness', [self.stiffness], 1, 'N m/rad')
+        checked_vector('damping', [self.damping], 1, 'N m s/rad', 0.0)
+        checked_vector('gravity', [self.gravity], 1, 'm/s^2')
+        checked_vector('stiffness', [self.stiffness], 1, 'N m/rad')
         if self.stiffness <= 0.0:
             raise InvalidModel(f'stiffness must be above 0 N m/rad, got {self.stiffness:g}')
-        _check_realizable(self)
+        check_realizable(self.inertia, self.static_moment, self.carried_mass)
 
     @classmethod
     def reduced(
@@ -194,16 +185,16 @@ class PlanarArm:
             If this is no physical arm.
 
         """
-        both, last = _vector('inertia_star', inertia_star, 2, 'kg m^2')
+        both, last = checked_vector('inertia_star', inertia_star, 2, 'kg m^2')
         if not both > last > 0.0:
             raise InvalidModel(
                 f'inertia_star must satisfy I*_(n-1) > I*_n > 0 kg m^2, got {both:g}, {last:g}'
             )
-        length, com, mass, own = _links(link_length, link_com, link_mass, link_inertia)
-        (tip,) = _vector('tip_mass', [tip_mass], 1, 'kg', 0.0)
+        length, com, mass, own = checked_links(link_length, link_com, link_mass, link_inertia)
+        (tip,) = checked_vector('tip_mass', [tip_mass], 1, 'kg', 0.0)
         count = length.size
         rider = np.arange(count)[-1:]  # empty for n = 2: the tip is then the base
-        chain = _load(
+        chain = chain_load(
             length,
             np.append(np.arange(count), rider),
             np.append(com, length[rider]),
@@ -218,8 +209,8 @@ class PlanarArm:
             stiffness=stiffness,
             damping=damping,
             gravity=gravity,
-            viscous_friction=_per_motor(viscous_friction, count + 1),
-            coulomb_friction=_per_motor(coulomb_friction, count + 1),
+            viscous_friction=per_motor(viscous_friction, count + 1),
+            coulomb_friction=per_motor(coulomb_friction, count + 1),
         )
 
     @classmethod
@@ -262,15 +253,17 @@ class PlanarArm:
             If this is no physical arm.
 
         """
-        length, com, mass, own = _links(link_length, link_com, link_mass, link_inertia)
+        length, com, mass, own = checked_links(link_length, link_com, link_mass, link_inertia)
         n = length.size
         if n < 2:
             raise InvalidModel(f'an arm must have at least 2 links, got {n}')
-        load = _load(
+        load = chain_load(
             length,
             np.append(np.arange(n), [n - 2, n - 1]),
-            np.append(com, -_vector('counterbalance_arm', counterbalance_arm, 2, 'm', 0.0)),
-            np.append(mass, _vector('counterbalance_mass', counterbalance_mass, 2, 'kg', 0.0)),
+            np.append(com, -checked_vector('counterbalance_arm', counterbalance_arm, 2, 'm', 0.0)),
+            np.append(
+                mass, checked_vector('counterbalance_mass', counterbalance_mass, 2, 'kg', 0.0)
+            ),
         )
         return cls(
             inertia=load.inertia + np.diag(own),
@@ -279,8 +272,8 @@ class PlanarArm:
             stiffness=stiffness,
             damping=damping,
             gravity=gravity,
-            viscous_friction=_per_motor(viscous_friction, n - 1),
-            coulomb_friction=_per_motor(coulomb_friction, n - 1),
+            viscous_friction=per_motor(viscous_friction, n - 1),
+            coulomb_friction=per_motor(coulomb_friction, n - 1),
         )
 
     def scaled(
@@ -500,95 +493,3 @@ def _apply(matrix: Array, vector: Array) -> Array:
     """Return the product with each vector of a stack, shape (..., n)."""
     product: Array = (matrix @ vector[..., None])[..., 0]
     return product
-
-
-def _load(length: Array, link: npt.NDArray[np.intp], place: Array, mass: Array) -> _Load:
-    """
-    Return the load of point masses, each riding at a place on a link of a chain.
-
-    Their levers J (masses, links) are a link's length where it only carries the mass.
-    """
-    index = np.arange(length.size)
-    lever = np.where(index < link[:, None], length, 0.0)
-    lever[np.arange(link.size), link] = place
-    return _Load((lever.T * mass) @ lever, mass @ lever, mass @ (index <= link[:, None]))
-
-
-def _links(
-    length: npt.ArrayLike, com: npt.ArrayLike, mass: npt.ArrayLike, inertia: npt.ArrayLike
-) -> tuple[Array, Array, Array, Array]:
-    """Return the four link arrays, checked."""
-    n = np.size(length)
-    return (
-        _vector('link_length', length, n, 'm', 0.0),
-        _vector('link_com', com, n, 'm'),
-        _vector('link_mass', mass, n, 'kg', 0.0),
-        _vector('link_inertia', inertia, n, 'kg m^2', 0.0),
-    )
-
-
-def _per_motor(value: npt.ArrayLike | None, motors: int) -> Array:
-    """Return one number per actuated joint, zeros for None."""
-    return np.zeros(motors) if value is None else np.array(value, dtype=float)
-
-
-def _vector(name: str, value: npt.ArrayLike, size: int, unit: str, lower: float = -inf) -> Array:
-    """Return a locked copy, shape (size,), of finite numbers not below a bound."""
-    array = np.array(value, dtype=float)
-    if array.shape != (size,):
-        raise InvalidModel(f'{name} must have {size} entries, got shape {array.shape}')
-    if not np.isfinite(array).all():
-        raise InvalidModel(f'{name} must be finite, got {array} {unit}')
-    if (array < lower).any():
-        raise InvalidModel(f'{name} must be at least {lower:g} {unit}, got {array.min():g}')
-    array.setflags(write=False)
-    return array
-
-
-def _check_definite(inertia: Array) -> None:
-    """
-    Refuse coefficients h of a mass matrix that is not positive definite in every pose.
-
-    H(theta) is the entrywise product of h and cos(theta_i - theta_j), which is positive
-    semidefinite with unit diagonal. By the Schur product theorem H is positive definite in every
-    pose if h is; the stretched arm, H = h, shows that nothing less will do.
-    """
-    if not np.isfinite(inertia).all():
-        raise InvalidModel(f'inertia must be finite, got {inertia.tolist()} kg m^2')
-    own = np.diag(inertia)
-    if own.min() <= 0.0:
-        raise InvalidModel(f'inertia of every link must be above 0 kg m^2, got {own.min():g}')
-    scaled = inertia / np.sqrt(np.outer(own, own))
-    if (np.abs(scaled - scaled.T) > SYMMETRY_TOLERANCE).any():
-        raise InvalidModel(f'inertia must be symmetric, got {inertia.tolist()} kg m^2')
-    least = float(np.linalg.eigvalsh(scaled)[0])
-    if least < DEFINITE_TOLERANCE:
-        raise InvalidModel(
-            f'inertia must be positive definite: scaled to unit diagonal its least eigenvalue is '
-            f'{least:.3g}, below {DEFINITE_TOLERANCE:g}'
-        )
-
-
-def _check_realizable(arm: PlanarArm) -> None:
-    """
-    Refuse inertias and static moments that no masses on a chain have together.
-
-    Links i < j are coupled by h_ij = l_i s_j, and s_i^2 <= (carried mass) h_ii.
-    """
-    own = np.sqrt(np.diag(arm.inertia))
-    least_mass = (arm.static_moment / own) ** 2
-    if (least_mass > arm.carried_mass * (1.0 + DEFINITE_TOLERANCE)).any():
-        raise InvalidModel(
-            f'carried_mass must be at least static_moment^2 / inertia = {least_mass} kg, '
-            f'got {arm.carried_mass}'
-        )
-    for i in range(arm.n - 1):
-        coupling, moment = arm.inertia[i, i + 1 :], arm.static_moment[i + 1 :]
-        length = coupling @ np.linalg.pinv(moment[:, None])[0]
-        miss = float(np.max(np.abs(coupling - length * moment) / (own[i] * own[i + 1 :])))
-        if miss > COUPLING_TOLERANCE:
-            raise InvalidModel(
-                f'inertia and static_moment disagree: link {i + 1} must be coupled to those '
-                f'beyond it in proportion to their static moments, relative miss {miss:.3g}, '
-                f'bound {COUPLING_TOLERANCE:g}'
-            )

@@ -35,13 +35,13 @@ class VibrationMonitor:
     Parameters
     ----------
     settings
-        Window, tolerances and expectations.
+        Window, tolerances and expectations; may be replaced at any time.
 
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
         """Wait for a motion."""
-        self._settings = settings
+        self.settings = settings
         self.reset()
 
     def reset(self) -> None:
@@ -110,7 +110,7 @@ class VibrationMonitor:
 
         """
         time, positions = sample.time, sample.positions
-        if time < self._last_sample - self._settings.timeout:
+        if time < self._last_sample - self.settings.timeout:
             self.reset()
         # The sum of squares is finite only if all positions are.
         if not (time > self._last_sample and isfinite(time + float(positions.dot(positions)))):
@@ -126,7 +126,7 @@ class VibrationMonitor:
             self._efforts.append(time, nan if sample.efforts is None else sample.efforts)
         if time >= motion.end:
             self._positions.append(time, positions)
-        if time >= motion.end + self._settings.window:
+        if time >= motion.end + self.settings.window:
             return self._close(time)
         return report
 
@@ -145,7 +145,7 @@ class VibrationMonitor:
             Stale report on a motion whose samples stopped, or report on one cut short.
 
         """
-        if now < self._now - self._settings.timeout:
+        if now < self._now - self.settings.timeout:
             self.reset()
         return self._advance(now)
 
@@ -183,7 +183,7 @@ class VibrationMonitor:
         self._now = max(self._now, now)
         report = None
         silence = now - self._heard
-        if self._is_watching() and silence > self._settings.timeout:
+        if self._is_watching() and silence > self.settings.timeout:
             report = self._close(now, f'no samples for {silence:.3g} s', stale=True)
         if self._state is Phase.MOVING and self._motion is not None and now >= self._motion.end:
             self._state = Phase.SETTLING
@@ -202,7 +202,7 @@ class VibrationMonitor:
         if former is not None and self._is_watching():
             is_spliced = motion.start <= former.end
             if not is_spliced:
-                is_cut = motion.start < former.end + self._settings.window
+                is_cut = motion.start < former.end + self.settings.window
                 cause = 'window cut short by the next motion' if is_cut else ''
                 report = self._close(motion.start, cause)
         # A motion spliced into a running one starts with what that one has measured.
@@ -213,7 +213,7 @@ class VibrationMonitor:
         if now < motion.end:
             self._state = Phase.MOVING
         else:
-            is_past = now > motion.end + self._settings.window
+            is_past = now > motion.end + self.settings.window
             self._state = Phase.DONE if is_past else Phase.SETTLING
         return report
 
@@ -225,7 +225,7 @@ class VibrationMonitor:
         if self._motion is None:
             return None
         return assess(
-            self._motion, self._settings, self._positions, self._efforts, until, cause, stale=stale
+            self._motion, self.settings, self._positions, self._efforts, until, cause, stale=stale
         )
 
 

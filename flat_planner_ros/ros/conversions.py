@@ -12,6 +12,7 @@ from flat_planner_ros.core import (
     InvalidCommand,
     InvalidRequest,
     JointSample,
+    MAX_POINTS,
     Motion,
     PlannedMotion,
     PlanSamples,
@@ -20,7 +21,6 @@ from flat_planner_ros.core import (
     Residual,
     select,
 )
-from flat_planner_ros.core.goal import MAX_POINTS
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
@@ -40,8 +40,10 @@ def seconds(time: Time | Duration) -> float:
 
 def time_msg(time: float) -> Time:
     """Return the stamp of an absolute time [s]."""
-    sec, nanosec = divmod(round(time * NANOSECONDS), NANOSECONDS)
-    return Time(sec=sec, nanosec=nanosec)
+    # Split first: a product of some 1e18 would round off the last hundred nanoseconds.
+    sec, fraction = divmod(time, 1.0)
+    carry, nanosec = divmod(round(fraction * NANOSECONDS), NANOSECONDS)
+    return Time(sec=int(sec) + carry, nanosec=nanosec)
 
 
 def duration_msg(duration: float) -> Duration:

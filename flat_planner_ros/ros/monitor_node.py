@@ -92,10 +92,8 @@ class MonitorNode(Node):
         self._report: VibrationReport | None = None
 
     def _apply(self, settings: MonitorSettings) -> None:
-        """Watch the present plan anew, with changed parameters."""
-        self._monitor = VibrationMonitor(settings)
-        if self._plan is not None:
-            self._monitor.plan(self._plan)
+        """Judge with changed parameters from now on."""
+        self._monitor.settings = settings
 
     def _on_plan(self, msg: JointTrajectory) -> None:
         """Take a plan, for whatever joints it names."""

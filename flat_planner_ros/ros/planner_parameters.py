@@ -1,18 +1,18 @@
 """Parameters of the planner node."""
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, isqrt
 
 from flat_planner_ros.core import (
     flat_map,
     FlatModel,
+    MAX_WEIGHT,
     PlanningOptions,
     SessionSettings,
     StartSource,
     Strategy,
     strategy_cost,
 )
-from flat_planner_ros.core.cost import MAX_WEIGHT, ORDER
 from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
 import numpy as np
 from rclpy.parameter import Parameter
@@ -243,9 +243,9 @@ def _custom_cost(values: Values) -> np.ndarray | None:
     numbers = values.get('weights.Q')
     if numbers is None:
         return None
-    if len(numbers) != ORDER**2:
-        raise InvalidParameter(f'weights.Q needs {ORDER**2} numbers, got {len(numbers)}')
-    return np.reshape(numbers, (ORDER, ORDER))
+    # As it is: the cost itself refuses what is not 6 x 6.
+    side = isqrt(len(numbers))
+    return np.reshape(numbers, (side, side) if side**2 == len(numbers) else -1)
 
 
 def _refuse_unavailable(values: Values) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 import os
 from pathlib import Path
 import signal
@@ -58,9 +58,8 @@ class Process:
         self, module: str, arguments: Sequence[str], environment: Mapping[str, str]
     ) -> None:
         """Start it."""
-        self._files = files = ExitStack()
-        self._out = files.enter_context(tempfile.TemporaryFile())
-        self._err = files.enter_context(tempfile.TemporaryFile())
+        self._out = tempfile.TemporaryFile()  # noqa: SIM115  Closed by `close`.
+        self._err = tempfile.TemporaryFile()  # noqa: SIM115
         self._popen = subprocess.Popen(
             [sys.executable, '-m', module, *arguments],
             env={**os.environ, **environment},
@@ -106,7 +105,8 @@ class Process:
     def close(self) -> None:
         """Leave nothing behind."""
         self.kill()
-        self._files.close()
+        self._out.close()
+        self._err.close()
 
 
 class Graph:
