@@ -29,16 +29,19 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
 
     """
     nodes: list[Node] = []
+    executor = None
     try:
         # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
         try:
             rclpy.init(args=args)
+            executor = SingleThreadedExecutor()
             for create in creators:
                 nodes.append(create())
         except (FlatPlannerError, ParameterException, RuntimeError) as error:
+            if executor is not None and not rclpy.ok():
+                return 0  # A signal came while the nodes were made.
             print(f'cannot start: {" ".join(str(error).split())}', file=sys.stderr)
             return 1
-        executor = SingleThreadedExecutor()
         for node in nodes:
             executor.add_node(node)
         executor.spin()

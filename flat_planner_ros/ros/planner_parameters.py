@@ -8,6 +8,7 @@ from flat_planner_ros.core import (
     FlatModel,
     MAX_WEIGHT,
     PlanningOptions,
+    QuadraticCost,
     SessionSettings,
     StartSource,
     Strategy,
@@ -243,9 +244,10 @@ def _custom_cost(values: Values) -> np.ndarray | None:
     numbers = values.get('weights.Q')
     if numbers is None:
         return None
-    # As it is: the cost itself refuses what is not 6 x 6.
     side = isqrt(len(numbers))
-    return np.reshape(numbers, (side, side) if side**2 == len(numbers) else -1)
+    matrix = np.reshape(numbers, (side, side) if side**2 == len(numbers) else -1)
+    # Refused now if it is inadmissible, even while another strategy is in use.
+    return QuadraticCost(matrix=matrix).matrix
 
 
 def _refuse_unavailable(values: Values) -> None:

@@ -17,9 +17,6 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-EFFORT_COMMANDS = '~/effort_commands'
-"""The planner's stream of efforts."""
-
 CLOCK_START = 1.0
 """Where /clock starts [s]; 0 would mean that there is no time yet."""
 
@@ -63,7 +60,7 @@ class PlantNode(Node):
         """Subscribe to what moves the arm."""
         topic, kind, callback = {
             CommandInput.TRAJECTORY: (interfaces.COMMAND, JointTrajectory, self._on_trajectory),
-            CommandInput.EFFORT: (EFFORT_COMMANDS, Float64MultiArray, self._on_effort),
+            CommandInput.EFFORT: (interfaces.EFFORT_COMMANDS, Float64MultiArray, self._on_effort),
         }[self._settings.command_input]
         name = interfaces.of(interfaces.PLANNER, topic)
         self.create_subscription(kind, name, callback, interfaces.RELIABLE)

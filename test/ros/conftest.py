@@ -45,23 +45,19 @@ class Process:
 
     Parameters
     ----------
-    module
-        What `python -m` runs.
-    arguments
-        Its command line.
+    command
+        The program and its arguments.
     environment
         Variables besides the test's own.
 
     """
 
-    def __init__(
-        self, module: str, arguments: Sequence[str], environment: Mapping[str, str]
-    ) -> None:
+    def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
         """Start it."""
         self._out = tempfile.TemporaryFile()  # noqa: SIM115  Closed by `close`.
         self._err = tempfile.TemporaryFile()  # noqa: SIM115
         self._popen = subprocess.Popen(
-            [sys.executable, '-m', module, *arguments],
+            command,
             env={**os.environ, **environment},
             stdout=self._out,
             stderr=self._err,
@@ -98,8 +94,9 @@ class Process:
         return self._popen.wait(timeout)
 
     def kill(self) -> None:
-        """End it at once."""
-        self._popen.kill()
+        """End it at once, with whatever it has started."""
+        with suppress(ProcessLookupError):
+            os.killpg(self._popen.pid, signal.SIGKILL)
         self._popen.wait(TIMEOUT)
 
     def close(self) -> None:
@@ -190,17 +187,15 @@ class Graph:
 
     def start(self, module: str, *arguments: str, **environment: str) -> Process:
         """Start a module of our ROS layer, e.g. 'plant_node', as a process on the same graph."""
+        name = f'flat_planner_ros.ros.{module}'
+        return self.run([sys.executable, '-m', name, *arguments], **environment)
+
+    def run(self, command: Sequence[str], **environment: str) -> Process:
+        """Start any program on the same graph; it finds the code under test first."""
         paths = [str(Path(flat_planner_ros.__file__).parents[1])]
         paths += filter(None, [os.environ.get('PYTHONPATH')])
-        process = Process(
-            f'flat_planner_ros.ros.{module}',
-            arguments,
-            {
-                'PYTHONPATH': os.pathsep.join(paths),
-                'ROS_DOMAIN_ID': str(self.domain),
-                **environment,
-            },
-        )
+        own = {'PYTHONPATH': os.pathsep.join(paths), 'ROS_DOMAIN_ID': str(self.domain)}
+        process = Process(command, {**own, **environment})
         self._processes.append(process)
         return process
 
