@@ -353,8 +353,8 @@ def _graded_quadrature(law: MotionLaw) -> tuple[FloatArray, FloatArray]:
     is_alive = np.outer(depths, np.abs(rates.real)) < NEGLIGIBLE_DECAY
     turns = 2.0 * np.diff(edges) * (is_alive * np.abs(rates)).max(axis=1)
     parts = 1.0 + np.floor(turns / RADIANS_PER_PANEL)
-    parts = np.ceil(parts * min(1.0, MAX_PANELS / parts.sum())).astype(int)
-    widths = np.repeat(np.diff(edges) / parts, parts)
+    counts = np.ceil(parts * min(1.0, MAX_PANELS / parts.sum())).astype(int)
+    widths = np.repeat(np.diff(edges) / counts, counts)
     starts = np.cumsum(widths) - widths
     nodes, weights = np.polynomial.legendre.leggauss(NODES_PER_PANEL)
     times = starts[:, None] + widths[:, None] * 0.5 * (nodes + 1.0)
