@@ -24,7 +24,7 @@ class FlatModel(Enum):
     """The paper's first-order Taylor expansion of the damping term: w = y1."""
 
     EXACT = 'exact'
-    """No approximation: w = z with y1 = z + (c_n / k_n) dz/dt, which the damped spring solves."""
+    """No approximation: y1 = w + (c_n / k_n) dw/dt, which solves the damped spring's equation."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +73,8 @@ def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.APPROXIMATE) -> FlatMa
 
     References
     ----------
-    Equations (11) to (13) of docs/derivation.md; `eq:qn` and `eq:tau` of the paper.
+    Equations (11) to (13) and (15a), (15b) of docs/derivation.md; `eq:qn` and `eq:tau` of the
+    paper.
 
     """
     arm.check_flat()

@@ -6,6 +6,7 @@ from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.core import FlatModel
 from flat_planner_ros.paper_example import DURATION, GOAL_ANGLE, Recording, Result, Scenario
 from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.parameters import EXAMPLE_ARM
@@ -144,10 +145,17 @@ class Experimenter(Node):
         raise ExperimentFailed(f'not played as planned {ATTEMPTS} times: the machine is too busy')
 
     def _configure(self, scenario: Scenario, strategy: str) -> None:
-        """Set the strategy, what the planner knows of the damping, and the plant's mismatch."""
+        """Set the paper's planner, what it knows of the damping, and the plant's mismatch."""
         planner, plant, monitor = OURS
         damping = scenario.damping_factor * EXAMPLE_ARM['model.damping']
-        self._set(planner, {'strategy': strategy, 'model.damping': damping})
+        self._set(
+            planner,
+            {
+                'strategy': strategy,
+                'model.damping': damping,
+                'flat_model': FlatModel.APPROXIMATE.value,
+            },
+        )
         self._set(monitor, {'model.damping': damping})
         mismatch = {
             'mismatch.stiffness_scale': scenario.stiffness_scale,

@@ -36,6 +36,9 @@ PR_SET_PDEATHSIG = 1
 TERMINATION = 5.0
 """Time that a node is given to end by itself [s]."""
 
+SHOWN_AS_DECIMAL = 1e-4
+"""Amplitude from which the table shows decimals rather than an exponent [rad]."""
+
 COLUMNS = (
     'scenario',
     'strategy',
@@ -75,6 +78,10 @@ def main(args: Sequence[str] | None = None) -> int:
     if options.plot is not None and find_spec('matplotlib') is None:
         print('--plot needs matplotlib: pip install "flat_planner_ros[plot]"', file=sys.stderr)
         return 1
+    for path in (options.plot, options.csv):
+        if path is not None and not path.parent.is_dir():
+            print(f'paper_table: no directory {path.parent} for {path.name}', file=sys.stderr)
+            return 1
     speed = 1.0 if options.real_time else SPEED
     try:
         rclpy.init(args=args)
@@ -176,9 +183,14 @@ def _end_with_parent() -> None:
 def _row(result: Result) -> str:
     """Return a line of the table."""
     rms, amplitude = result.printed
+    ours = (
+        f'{result.amplitude:.5f}'
+        if result.amplitude > SHOWN_AS_DECIMAL
+        else f'{result.amplitude:.1e}'
+    )
     return (
         f' {result.scenario.number:^8} | {result.strategy:<21} | {result.rms_effort:.5f} | '
-        f'{rms:<7g} | {result.amplitude:<10.3g} | {amplitude:g}'
+        f'{rms:<7g} | {ours:<10} | {amplitude:g}'
     )
 
 

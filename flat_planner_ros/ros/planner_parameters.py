@@ -71,7 +71,7 @@ ROWS = [
     ),
     Row(
         name='flat_model',
-        default=FlatModel.APPROXIMATE.value,
+        default=FlatModel.EXACT.value,
         description="treatment of the passive joint's damping; approximate is the paper's",
         choices=tuple(model.value for model in FlatModel),
     ),

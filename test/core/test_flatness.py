@@ -2,7 +2,7 @@
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import NotFlat
-from flat_planner_ros.core.flatness import apply_row, flat_map
+from flat_planner_ros.core.flatness import apply_row, flat_map, FlatModel
 import numpy as np
 import pytest
 
@@ -38,9 +38,9 @@ def flat_arm(rng, n, damping_ratio):
     )
 
 
-def motion(arm, rng, jet):
+def motion(arm, rng, jet, model=FlatModel.APPROXIMATE):
     """Return q, dq, ddq of a jet of y1; the other flat outputs move at random."""
-    mapping = flat_map(arm)
+    mapping = flat_map(arm, model)
     others = [sinusoids(rng, 3, 1.0) for _ in range(arm.n - 2)]
     passive = np.array([apply_row(mapping.deflection, jet, k) for k in range(3)])
     angle = np.array([apply_row(mapping.output, jet, k) for k in range(3)])
@@ -65,6 +65,36 @@ def test_an_undamped_arm_follows_the_map_exactly(n):
         assert np.abs(expected).max() > 1e-9 * scale
         checked += 1
     assert checked == CASES
+
+
+@pytest.mark.parametrize('n', [2, 3, 4])
+def test_the_exact_map_holds_for_any_damping(n):
+    """Even an overdamped spring asks for no effort at the passive joint."""
+    rng = np.random.default_rng(20 + n)
+    checked = 0
+    for _ in range(CASES):
+        arm = flat_arm(rng, n, 10.0 ** rng.uniform(-2.0, 0.5))
+        frequency = np.sqrt(arm.stiffness / arm.inertia_star.last)
+        jet = sinusoids(rng, 9, frequency)
+        effort = arm.inverse_dynamics(*motion(arm, rng, jet, FlatModel.EXACT))
+        expected = apply_row(flat_map(arm, FlatModel.EXACT).effort, jet)
+        terms = np.abs(arm.passive_effort(*motion(arm, rng, jet, FlatModel.EXACT)[:2, :, -1]))
+        scale = np.abs(effort).max() + terms.max()
+        np.testing.assert_allclose(effort[:, -2], expected, rtol=0, atol=1e-12 * scale)
+        np.testing.assert_allclose(effort[:, -1], 0.0, rtol=0, atol=1e-12 * scale)
+        assert np.abs(expected).max() > 1e-9 * scale
+        checked += 1
+    assert checked == CASES
+
+
+def test_both_maps_are_one_without_damping(paper_arm):
+    arm = paper_arm.scaled(damping=0.0)
+    approximate, exact = (flat_map(arm, model) for model in FlatModel)
+    jet = np.random.default_rng(1).normal(size=(7, 5))
+    for row in ('output', 'deflection', 'effort'):
+        assert apply_row(getattr(approximate, row), jet) == pytest.approx(
+            apply_row(getattr(exact, row), jet), rel=1e-15
+        )
 
 
 @pytest.mark.parametrize('n', [2, 3])

@@ -63,6 +63,22 @@ def values(message: DiagnosticArray) -> dict[str, str]:
     return {pair.key: pair.value for pair in message.status[0].values}
 
 
+@pytest.mark.parametrize(
+    'strategy', ['polynomial', 'min_control_effort', 'min_potential_energy', 'mixed']
+)
+def test_the_exact_map_leaves_nothing_with_damping(graph, strategy):
+    suite = Suite(graph, planner={'strategy': strategy, 'flat_model': 'exact'})
+    _, report = suite.move(pi)
+    assert float(report['amplitude']) < 1e-5
+    assert float(report['final_error.joint1']) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_the_papers_map_leaves_what_the_paper_found(graph):
+    suite = Suite(graph, planner={'strategy': 'polynomial', 'flat_model': 'approximate'})
+    _, report = suite.move(pi)
+    assert float(report['amplitude']) == pytest.approx(0.00449, rel=0.02)
+
+
 def test_without_damping_nothing_is_left(graph):
     undamped = {'model.inertia_star': [6.4e-4, 3.3e-5], 'model.stiffness': 3e-3}
     undamped |= {'model.damping': 0.0, 'joints': ['joint1', 'joint2']}
@@ -77,7 +93,8 @@ def test_without_damping_nothing_is_left(graph):
 
 
 def test_a_mismatch_is_seen_and_its_frequency_is_measured(graph):
-    suite = Suite(graph, plant={'mismatch.stiffness_scale': 1.1, 'mismatch.damping_scale': 1.1})
+    mismatch = {'mismatch.stiffness_scale': 1.1, 'mismatch.damping_scale': 1.1}
+    suite = Suite(graph, planner={'flat_model': 'approximate'}, plant=mismatch)
     _, report = suite.move(pi)
     assert float(report['amplitude']) == pytest.approx(0.0758, rel=0.02)
     # The plant's own frequency, not the one that the model expects.
@@ -88,7 +105,8 @@ def test_a_mismatch_is_seen_and_its_frequency_is_measured(graph):
 
 
 def test_two_motions_give_two_reports_and_each_starts_where_the_last_ended(graph):
-    suite = Suite(graph, planner={'strategy': 'min_potential_energy'})
+    approximate = {'strategy': 'min_potential_energy', 'flat_model': 'approximate'}
+    suite = Suite(graph, planner=approximate)
     suite.move(1.0)
     _, second = suite.move(-0.5)
     assert len(suite.reports) == 2
@@ -99,7 +117,7 @@ def test_two_motions_give_two_reports_and_each_starts_where_the_last_ended(graph
 
 
 def test_a_rejected_goal_disturbs_no_motion(graph):
-    suite = Suite(graph)
+    suite = Suite(graph, planner={'flat_model': 'approximate'})
     goal = JointTrajectory(joint_names=['joint1'])
     goal.points = [
         JointTrajectoryPoint(positions=[pi], time_from_start=conversions.duration_msg(1.0))

@@ -129,9 +129,9 @@ def test_the_verdict_states_numbers_and_repeats_the_goal(planner):
     assert accepted['plan_id'] == '1'
     assert (accepted['error_code'], accepted['error_name']) == ('0', 'SUCCESSFUL')
     assert accepted['strategy'] == 'min_control_effort'
-    assert accepted['flat_model'] == 'approximate'
+    assert accepted['flat_model'] == 'exact'
     assert float(accepted['duration']) == 1.0
-    assert float(accepted['rms_effort.joint1']) == pytest.approx(0.007444, rel=5e-3)
+    assert float(accepted['rms_effort.joint1']) == pytest.approx(0.007427, rel=1e-3)
     assert float(accepted['peak_effort.joint1']) > float(accepted['rms_effort.joint1'])
     assert float(accepted['rms_effort.joint2']) == 0.0
     assert float(accepted['peak_velocity.joint1']) > pi
@@ -390,7 +390,7 @@ def test_a_custom_cost_is_planned(graph):
     planner = Planner(graph, {'strategy': 'custom', 'weights.Q': matrix.ravel().tolist()})
     planner.measure()
     verdict = planner.send(goal())
-    assert float(verdict['rms_effort.joint1']) == pytest.approx(0.008761, rel=5e-3)
+    assert float(verdict['rms_effort.joint1']) == pytest.approx(0.008709, rel=1e-3)
 
 
 def test_the_command_can_be_cut_to_what_an_executor_takes(graph):
