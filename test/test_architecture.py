@@ -23,13 +23,15 @@ MAY_IMPORT = {
     'links': 'errors',
     'arm': 'links errors',
     # the plant
-    'simulation': 'arm errors',
+    'interpolation': '',
+    'effort_profile': 'interpolation errors',
+    'simulation': 'effort_profile arm errors',
     'sensing': 'simulation errors',
-    'pacing': 'sensing simulation arm errors',
+    'pacing': 'sensing simulation effort_profile arm errors',
     # the monitor
     'oscillation_search': 'errors',
     'oscillation': 'oscillation_search errors',
-    'motion_record': 'errors',
+    'motion_record': 'interpolation errors',
     'vibration_report': 'oscillation errors',
     'assessment': 'motion_record oscillation vibration_report errors',
     'vibration': 'assessment motion_record oscillation vibration_report errors',

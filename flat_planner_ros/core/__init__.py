@@ -2,6 +2,7 @@
 
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
     InvalidCommand,
@@ -27,7 +28,7 @@ from flat_planner_ros.core.pacing import PacedArm, SimulationSettings
 from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
-from flat_planner_ros.core.simulation import ArmState, EffortProfile, rollout, SimulatedArm
+from flat_planner_ros.core.simulation import ArmState, rollout, SimulatedArm
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 

@@ -1,10 +1,11 @@
 """Verdict on the oscillation that a motion leaves behind."""
 
+from math import sqrt
+
 from flat_planner_ros.core.motion_record import Array, PlannedMotion, Record
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 import numpy as np
-from scipy.integrate import trapezoid
 
 EFFORT_GAP = 0.1
 """Longest hole in the measured efforts that their RMS forgives, relative to the motion [-]."""
@@ -107,9 +108,7 @@ def _time_mean(times: Array, rows: Array, start: float) -> tuple[float, ...]:
         return tuple(map(float, rows[-1]))
     grid = np.concatenate(([start], times[times > start]))
     span = grid[-1] - start
-    return tuple(
-        float(trapezoid(np.interp(grid, times, column), grid) / span) for column in rows.T
-    )
+    return tuple(_integral(np.interp(grid, times, column), grid) / span for column in rows.T)
 
 
 def _rms_effort(times: Array, efforts: Array, joint: int, motion: PlannedMotion) -> float | None:
@@ -122,7 +121,14 @@ def _rms_effort(times: Array, efforts: Array, joint: int, motion: PlannedMotion)
         return None
     grid = np.unique(np.concatenate((ends, times[known])))
     squares = np.interp(grid, times[known], efforts[known, joint] ** 2)
-    return float(np.sqrt(trapezoid(squares, grid) / duration)) if duration > 0.0 else None
+    return sqrt(_integral(squares, grid) / duration) if duration > 0.0 else None
+
+
+def _integral(values: Array, grid: Array) -> float:
+    """Return the integral of samples that are joined linearly."""
+    from scipy.integrate import trapezoid  # here: slow to import, and only needed for a report
+
+    return float(trapezoid(values, grid))
 
 
 def _level(fit: OscillationFit, settings: MonitorSettings) -> Level:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from flat_planner_ros.core.errors import InvalidRequest
+from flat_planner_ros.core.interpolation import interpolate_motion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -107,22 +108,7 @@ class PlannedMotion:
             interpolation if velocities are planned, else by linear interpolation.
 
         """
-        elapsed = time - self.start
-        after = int(self.times.searchsorted(elapsed, side='right'))
-        if after == 0 or after == self.times.size:
-            return self.positions[max(after - 1, 0)], np.zeros(len(self.joint_names))
-        step = float(self.times[after] - self.times[after - 1])
-        s = (elapsed - float(self.times[after - 1])) / step
-        start, end = self.positions[after - 1], self.positions[after]
-        if self.velocities is None:
-            return start + s * (end - start), (end - start) / step
-        # Deviation from the chord, in the end slopes' differences to it.
-        chord = (end - start) / step
-        first, last = self.velocities[after - 1] - chord, self.velocities[after] - chord
-        r = 1.0 - s
-        position = start + s * (end - start) + step * s * r * (r * first - s * last)
-        velocity = chord + r * (1.0 - 3 * s) * first + s * (1.0 - 3 * r) * last
-        return position, velocity
+        return interpolate_motion(self.times, self.positions, self.velocities, time - self.start)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)

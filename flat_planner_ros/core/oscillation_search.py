@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
-from scipy.optimize import least_squares
 
 Array = NDArray[np.float64]
 
@@ -77,6 +75,9 @@ def _starts(u: Array, y: Array) -> Array:
     grid = np.linspace(0.0, 1.0, count)
     signal = np.interp(grid, u, y)
     signal = signal - np.polyval(np.polyfit(grid, signal, 1), grid)
+    # Here, not above: 0.3 s of import that a plant or a planner never needs.
+    from scipy.fft import next_fast_len, rfft
+
     length = next_fast_len(SPECTRUM_PADDING * count, real=True)
     power = np.abs(rfft(signal, length))
     peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:]))
@@ -114,6 +115,8 @@ def best_rates(u: Array, y: Array) -> Array:
 
 def _descend(u: Array, y: Array, start: Array, lower: Array, upper: Array) -> Any:
     """Return scipy's result of the separable least-squares problem from one start."""
+    from scipy.optimize import least_squares  # here for the same reason
+
     residual, jacobian = _separable(u, y)
     return least_squares(
         residual,

@@ -4,14 +4,10 @@ from dataclasses import dataclass, field, replace
 from math import ceil, floor, isfinite
 
 from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidCommand, InvalidModel
 from flat_planner_ros.core.sensing import Sensing, Sensor
-from flat_planner_ros.core.simulation import (
-    ArmState,
-    EffortProfile,
-    GRID_TOLERANCE,
-    SimulatedArm,
-)
+from flat_planner_ros.core.simulation import ArmState, GRID_TOLERANCE, SimulatedArm
 import numpy.typing as npt
 
 MAX_CATCH_UP = 1.0

@@ -4,38 +4,19 @@ True dynamics of an arm under a stamped effort command.
 Nothing here knows of flatness or planning, so that the simulated arm can prove a plan wrong.
 """
 
-from bisect import bisect_right
-from dataclasses import dataclass, replace
-from functools import cached_property
 from math import floor, inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.effort_profile import EffortProfile, JointReference, locked
 from flat_planner_ros.core.errors import InvalidCommand, InvalidModel
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline, PPoly
 
 Array = npt.NDArray[np.float64]
 
 GRID_TOLERANCE = 1e-6
 """A grid time ahead of the present by less counts as reached, relative to the step [-]."""
-
-
-class JointReference(NamedTuple):
-    """
-    What a command asks of the actuated joints at one time.
-
-    Attributes
-    ----------
-    effort, position, velocity
-        Shape (n-1,) [N m], [rad], [rad/s]; position and velocity NaN where none are commanded.
-
-    """
-
-    effort: Array
-    position: Array
-    velocity: Array
 
 
 class ArmState(NamedTuple):
@@ -75,159 +56,6 @@ class Rollout(NamedTuple):
     times: Array
     positions: Array
     velocities: Array
-
-
-class _Course(NamedTuple):
-    """Efforts that are linear in time between knots; times from the command's start [s]."""
-
-    times: list[float]
-    efforts: Array
-    slopes: Array
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EffortProfile:
-    """
-    A stamped effort command, played by time like joint_trajectory_controller does.
-
-    Efforts are linear between the points. The last point is held after the end. Before the first
-    point the effort goes linearly from the anchor to it; nothing is applied before the start when
-    there is no anchor.
-
-    Attributes
-    ----------
-    start
-        Absolute time of the command's stamp [s].
-    times
-        Times of the points from the start, increasing, shape (m,) [s].
-    efforts
-        Efforts of the actuated joints, exactly zero at the end, shape (m, n-1) [N m].
-    positions, velocities
-        References for feedback, shape (m, n-1) [rad], [rad/s]; both or only positions or none.
-    anchor_time, anchor_effort
-        Time at which the command was taken over [s] and the effort then, shape (n-1,) [N m].
-
-    """
-
-    start: float
-    times: Array
-    efforts: Array
-    positions: Array | None = None
-    velocities: Array | None = None
-    anchor_time: float | None = None
-    anchor_effort: Array | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be played and lock the arrays."""
-        start = float(self.start)
-        if not np.isfinite(start):
-            raise InvalidCommand(f'start must be finite, got {start} s')
-        times = _locked('times', self.times, 's')
-        if times.ndim != 1 or times.size < 1:
-            raise InvalidCommand(f'times must be (m,) with m >= 1, got shape {times.shape}')
-        if times[0] < 0.0:
-            raise InvalidCommand(f'times must not be negative, got {times[0]:g} s')
-        if (np.diff(times) <= 0.0).any():
-            i = int(np.argmax(np.diff(times) <= 0.0))
-            raise InvalidCommand(
-                f'times must increase, got {times[i]:.9g} s then {times[i + 1]:.9g} s'
-            )
-        efforts = _locked('efforts', self.efforts, 'N m')
-        if efforts.ndim != 2 or efforts.shape[0] != times.size or efforts.shape[1] < 1:
-            raise InvalidCommand(
-                f'efforts must be ({times.size}, n-1) with n >= 2, got shape {efforts.shape}'
-            )
-        if efforts[-1].any():
-            raise InvalidCommand(f'the last effort must be 0 N m, got {efforts[-1]}')
-        if self.velocities is not None and self.positions is None:
-            raise InvalidCommand('velocities need positions')
-        if (self.anchor_time is None) != (self.anchor_effort is None):
-            raise InvalidCommand('anchor_time and anchor_effort go together')
-        for name, value in {'start': start, 'times': times, 'efforts': efforts}.items():
-            object.__setattr__(self, name, value)
-        self._lock_optional('positions', self.positions, efforts.shape, 'rad')
-        self._lock_optional('velocities', self.velocities, efforts.shape, 'rad/s')
-        self._lock_optional('anchor_time', self.anchor_time, (), 's')
-        self._lock_optional('anchor_effort', self.anchor_effort, efforts.shape[1:], 'N m')
-
-    @property
-    def end(self) -> float:
-        """Return the absolute time of the last point [s]."""
-        return self.start + float(self.times[-1])
-
-    @property
-    def motors(self) -> int:
-        """Return the number n-1 of actuated joints."""
-        return int(self.efforts.shape[1])
-
-    def taken_over(self, at: float, effort: npt.ArrayLike) -> 'EffortProfile':
-        """Return a copy that starts from an effort (n-1,) [N m] applied at a time [s]."""
-        return replace(self, anchor_time=at, anchor_effort=np.asarray(effort, dtype=float))
-
-    def effort(self, t: float) -> Array:
-        """Return the effort at an absolute time [s], shape (n-1,) [N m]."""
-        course, elapsed = self._course, t - self.start
-        i = bisect_right(course.times, elapsed) - 1
-        if i < 0:
-            return self._before
-        effort: Array = course.efforts[i] + course.slopes[i] * (elapsed - course.times[i])
-        return effort
-
-    def reference(self, t: float) -> JointReference:
-        """
-        Return effort, position and velocity at an absolute time [s].
-
-        The first position is held before the first point, the last one after the end. Positions
-        without velocities are joined linearly.
-        """
-        effort = self.effort(t)
-        if self._motion is None:
-            missing = np.full(self.motors, np.nan)
-            return JointReference(effort, missing, missing)
-        elapsed = t - self.start
-        first, last = float(self.times[0]), float(self.times[-1])
-        position = self._motion(min(max(elapsed, first), last))
-        moving = first <= elapsed < last
-        velocity = self._motion(elapsed, 1) if moving else np.zeros(self.motors)
-        return JointReference(effort, position, velocity)
-
-    def _lock_optional(
-        self, name: str, value: npt.ArrayLike | None, shape: tuple[int, ...], unit: str
-    ) -> None:
-        """Lock a field that may be missing."""
-        if value is None:
-            return
-        array = _locked(name, value, unit)
-        if array.shape != shape:
-            raise InvalidCommand(f'{name} must have shape {shape}, got {array.shape}')
-        object.__setattr__(self, name, array if shape else float(array))
-
-    @cached_property
-    def _before(self) -> Array:
-        """Effort before the first knot."""
-        return np.zeros(self.motors) if self.anchor_effort is None else self.anchor_effort
-
-    @cached_property
-    def _course(self) -> _Course:
-        """Knots of the effort, the anchor among them if it precedes the first point."""
-        times, efforts = self.times, self.efforts
-        anchor = 0.0 if self.anchor_time is None else self.anchor_time - self.start
-        if anchor < times[0]:
-            times, efforts = np.append(anchor, times), np.vstack((self._before, efforts))
-        slopes = np.diff(efforts, axis=0) / np.diff(times)[:, None]
-        return _Course(times.tolist(), efforts, np.vstack((slopes, np.zeros(self.motors))))
-
-    @cached_property
-    def _motion(self) -> PPoly | None:
-        """Position as a piecewise polynomial of the time from the start."""
-        if self.positions is None:
-            return None
-        if self.times.size == 1:
-            return PPoly(self.positions[None], self.times[0] + np.array([0.0, 1.0]))
-        if self.velocities is not None:
-            return CubicHermiteSpline(self.times, self.positions, self.velocities)
-        slopes = np.diff(self.positions, axis=0) / np.diff(self.times)[:, None]
-        return PPoly(np.stack((slopes, self.positions[:-1])), self.times)
 
 
 class SimulatedArm:
@@ -367,7 +195,7 @@ class SimulatedArm:
 
     def hold(self, effort: npt.ArrayLike) -> None:
         """Apply a constant effort, shape (n-1,) [N m], until the next command, open loop."""
-        held = _locked('effort', effort, 'N m')
+        held = locked('effort', effort, 'N m')
         if held.shape != (self._arm.n - 1,):
             raise InvalidCommand(f'effort must have {self._arm.n - 1} entries, got {held.shape}')
         self._profile, self._held = None, held
@@ -491,12 +319,3 @@ def rollout(
         positions.append(simulated.position)
         velocities.append(simulated.velocity)
     return Rollout(np.array(times), np.array(positions), np.array(velocities))
-
-
-def _locked(name: str, value: npt.ArrayLike, unit: str) -> Array:
-    """Return a locked copy of finite numbers."""
-    array = np.array(value, dtype=float, order='C')
-    if not np.isfinite(array).all():
-        raise InvalidCommand(f'{name} must be finite, got a value that is not [{unit}]')
-    array.setflags(write=False)
-    return array
