@@ -20,18 +20,19 @@ PYTEST := import sys; sys.path[:] = filter(None, sys.path); import pytest; sys.e
 MADE := $(VENV)/made-for-$(if $(PYTHON),$(subst /,_,$(PYTHON))-)$(or $(ROS),wheels)
 DEPENDENCIES := $(VENV)/dependencies-installed
 PACKAGE := $(VENV)/package-installed
+PEERS := $(VENV)/peers-installed
 SOURCES := $(shell find flat_planner_ros config launch resource -type f -not -name '*.pyc' | sort)
 
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_PREFIX_PATH))
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test lint install clean FORCE
+.PHONY: help demo test fuzz bench lint install clean FORCE
 .DELETE_ON_ERROR:
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
-	@echo 'ARGS="..." is added to the command line of demo and test; PYTHON=... chooses the interpreter.'
+	@echo 'ARGS="..." is added to the command line of demo, test, fuzz and bench; PYTHON=... chooses the interpreter.'
 
 demo: install  ## the paper's experiment on the three nodes: table, figures and numbers in build/
 	@mkdir -p build
@@ -41,6 +42,13 @@ test: export REQUIRE_ROS := 1
 test: export ROS_PYTHON_CHECK_FIELDS := 1
 test: lint  ## ruff, mypy and all tests
 	$(BIN)/python -c '$(PYTEST)' --timeout=120 $(ARGS)
+
+fuzz: export FUZZ_CASES ?= 100000
+fuzz: install  ## random motions against multiple precision, FUZZ_CASES=100000 by default
+	$(BIN)/python -c '$(PYTEST)' -s test/fuzz $(ARGS)
+
+bench: install $(PEERS)  ## speed beside other libraries, and of the nodes; benchmarks/results.md
+	$(BIN)/python benchmarks/run.py $(ARGS)
 
 lint: install  ## ruff and mypy only
 	$(BIN)/python -m ruff check
@@ -69,6 +77,14 @@ $(DEPENDENCIES): setup.py pyproject.toml $(MADE)
 	$(BIN)/python -m pip install --quiet --progress-bar off 'setuptools>=70.1,<80' \
 	  $(if $(ROS),"numpy==$$(python3 -c 'import numpy; print(numpy.__version__)')") \
 	  '.[$(if $(ROS),,jazzy,)plot,test]'
+	@touch $@
+
+# The comparison goes on without libraries that cannot be had here.
+$(PEERS): setup.py $(DEPENDENCIES)
+	$(BIN)/python -m pip install --quiet --progress-bar off \
+	  "numpy==$$($(BIN)/python -c 'import numpy; print(numpy.__version__)')" '.[bench]' \
+	  || echo 'some libraries of the comparison could not be installed' >&2
+	@rm -rf build/lib build/bdist.* *.egg-info
 	@touch $@
 
 # A removed source changes no time stamp, hence the list; and it would live on in build/lib.

@@ -32,6 +32,13 @@ setup(
             'ros-jazzy-trajectory-msgs==5.3.6',
         ],
         'plot': ['matplotlib>=3.6,<4'],
+        # What benchmarks/ compares with; each may be missing.
+        'bench': [
+            'casadi>=3.6,<4',
+            'control>=0.10,<0.11',
+            'drake>=1.30,<2; sys_platform == "linux" and platform_machine == "x86_64"',
+            'matplotlib>=3.6,<4',
+        ],
         'test': [
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',

@@ -205,6 +205,11 @@ class PlannerSession:
 
         """
         settings = self.settings
+        if now <= 0.0:
+            raise RequestRejected(
+                Reason.START_STATE_UNKNOWN,
+                'there is no time yet: use_sim_time is set, but no /clock has been received',
+            )
         target = rest_target(goal, settings.joints)
         duration = self._checked_duration(target.duration)
         start_time = self._start_time(goal, now)
@@ -318,10 +323,13 @@ class PlannerSession:
                 Reason.START_STATE_UNKNOWN, 'no joint state of this arm has been received yet'
             )
         age, limit = now - self._measured.time, self.settings.measurement_timeout
-        if age > limit:
+        if not -limit <= age <= limit:
             raise RequestRejected(
                 Reason.START_STATE_STALE,
-                f'the last joint state is {age:.3f} s old, more than {limit:g} s',
+                f'the last joint state is {age:.3f} s old, more than {limit:g} s'
+                if age > 0.0
+                else f'the last joint state is stamped {-age:.3f} s ahead of the present: do the '
+                f'planner and its source go by the same clock (use_sim_time)?',
                 value=age,
                 limit=limit,
             )

@@ -140,6 +140,20 @@ def test_an_old_measurement_is_stale():
     assert error.limit == SETTINGS.measurement_timeout
 
 
+def test_a_measurement_by_another_clock_is_no_start():
+    planner = session()
+    planner.measure(sample(time=NOW + 1e9))
+    error = reason_of(planner.submit, GOAL, NOW)
+    assert error.reason is Reason.START_STATE_STALE
+    assert 'use_sim_time' in str(error)
+
+
+def test_nothing_starts_before_there_is_a_time():
+    error = reason_of(session().submit, GOAL, 0.0)
+    assert error.reason is Reason.START_STATE_UNKNOWN
+    assert '/clock' in str(error)
+
+
 @pytest.mark.parametrize(
     ('measured', 'reason', 'joint'),
     [
