@@ -32,18 +32,28 @@ MAY_IMPORT = {
     'oscillation_search': 'errors',
     'oscillation': 'oscillation_search errors',
     'motion_record': 'interpolation errors',
-    'vibration_report': 'oscillation errors',
-    'assessment': 'motion_record oscillation vibration_report errors',
+    'identification': 'oscillation oscillation_search arm errors',
+    'adoption': 'identification arm errors',
+    'vibration_report': 'identification arm oscillation errors',
+    'assessment': 'identification motion_record oscillation vibration_report errors',
     'vibration': 'assessment motion_record oscillation vibration_report errors',
     # the planner
     'flatness': 'arm errors',
     'cost': 'flatness arm errors',
     'roots': 'errors',
-    'motion_law': 'errors',
-    'extremal': 'cost motion_law roots errors',
+    'modes': 'errors',
+    'motion_law': 'modes errors',
+    'solutions': 'modes roots errors',
+    'extremal': 'solutions motion_law modes roots errors',
+    'quadrature': 'motion_law modes errors',
+    'unit_motion': 'quadrature extremal solutions motion_law modes errors',
+    'plan_samples': 'flatness arm errors',
     'goal': 'errors',
     'session': 'planning goal motion_record cost flatness arm errors',
-    'planning': 'extremal cost flatness arm motion_law errors',
+    'request': 'cost flatness errors',
+    'task': 'request unit_motion solutions cost flatness arm errors',
+    'planning': 'task request plan_samples unit_motion solutions motion_law cost flatness arm '
+    'errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

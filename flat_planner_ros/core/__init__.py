@@ -1,5 +1,11 @@
 """Planning, dynamics and judgement of flat elastic arms; free of ROS, files and clocks."""
 
+from flat_planner_ros.core.adoption import (
+    Adoption,
+    AdoptionRefused,
+    ModelTuner,
+    ReportedEstimate,
+)
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.effort_profile import EffortProfile
@@ -21,6 +27,7 @@ from flat_planner_ros.core.goal import (
     RequestRejected,
     rest_target,
 )
+from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
@@ -33,6 +40,9 @@ from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
 __all__ = [
+    'ActuatedJoints',
+    'Adoption',
+    'AdoptionRefused',
     'ArmState',
     'EffortProfile',
     'fit_oscillation',
@@ -42,6 +52,7 @@ __all__ = [
     'FlatPlannerError',
     'Goal',
     'GoalPoint',
+    'identify',
     'InvalidCommand',
     'InvalidCost',
     'InvalidModel',
@@ -50,6 +61,7 @@ __all__ = [
     'Level',
     'MAX_POINTS',
     'MAX_WEIGHT',
+    'ModelTuner',
     'MonitorSettings',
     'Motion',
     'MotionLaw',
@@ -67,6 +79,7 @@ __all__ = [
     'PlanSamples',
     'QuadraticCost',
     'Reason',
+    'ReportedEstimate',
     'RequestRejected',
     'Residual',
     'rest_target',
@@ -77,6 +90,7 @@ __all__ = [
     'SimulatedArm',
     'SimulationSettings',
     'StartSource',
+    'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
     'UncertifiedPlan',

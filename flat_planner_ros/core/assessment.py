@@ -2,6 +2,7 @@
 
 from math import sqrt
 
+from flat_planner_ros.core.identification import identify, StiffnessEstimate
 from flat_planner_ros.core.motion_record import Array, PlannedMotion, Record
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
@@ -51,6 +52,7 @@ def assess(
     times, rows = positions.between(motion.end, min(until, motion.end + settings.window))
     errors = rows - motion.final
     fit = fit_oscillation(times, errors[:, -1], motion.end)
+    estimate = _estimate(times - motion.end, errors, fit, settings)
     frequency = fit.frequency or settings.expected_frequency
     settling = _settling_time(times - motion.end, errors[:, -1], settings.settling_band, frequency)
     start = times[-1] - 1.0 / frequency if frequency and times.size else motion.end
@@ -67,6 +69,7 @@ def assess(
         else '',
         _settling_remark(settling, settings.settling_band),
         _effort_remark(motion.joint_names, rms),
+        _estimate_remark(estimate, fit),
     )
     return VibrationReport(
         level=Level.STALE if stale else _level(fit, settings),
@@ -83,7 +86,20 @@ def assess(
         rms_effort=rms,
         window=float(times[-1]) - motion.end if times.size else 0.0,
         samples=times.size,
+        estimate=estimate,
     )
+
+
+def _estimate(
+    elapsed: Array, errors: Array, fit: OscillationFit, settings: MonitorSettings
+) -> StiffnessEstimate | None:
+    """Return stiffness and damping if there is a model of the joints that are planned."""
+    arm, joints = settings.arm, errors.shape[1]
+    if arm is None:
+        return None
+    if joints != arm.n:
+        return StiffnessEstimate(reason=f'the plan has {joints} joints, the model {arm.n}')
+    return identify(elapsed, errors, fit, arm, settings.actuated_joints)
 
 
 def _settling_time(
@@ -175,3 +191,17 @@ def _effort_remark(names: tuple[str, ...], rms: tuple[float | None, ...]) -> str
     """Return whose effort was not measured throughout, if anyone's."""
     unknown = ', '.join(name for name, value in zip(names, rms, strict=True) if value is None)
     return f'effort of {unknown} not measured throughout the motion' if unknown else ''
+
+
+def _estimate_remark(estimate: StiffnessEstimate | None, fit: OscillationFit) -> str:
+    """Return stiffness and damping, or why they are not estimated unless that has been said."""
+    if estimate is None:
+        return ''
+    if not estimate.trustworthy or estimate.case is None:
+        reason = '' if fit.reason == estimate.reason else f' ({estimate.reason})'
+        return f'stiffness and damping not estimated{reason}'
+    return (
+        f'stiffness {estimate.stiffness:.6g} ± {estimate.stiffness_std:.2g} N m/rad and damping '
+        f'{estimate.damping:.4g} ± {estimate.damping_std:.2g} N m s/rad, estimated with the '
+        f'actuated joints {estimate.case.value}'
+    )

@@ -5,8 +5,9 @@ J = integral of Y^T Q Y over the motion, Y = (y', y'', ..., y^(6)) and Q66 = 1
 ((16) of docs/derivation.md).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, InitVar
 from enum import Enum
+from functools import cache
 
 from flat_planner_ros.core.errors import InvalidCost
 from flat_planner_ros.core.flatness import FlatMap
@@ -51,16 +52,21 @@ class QuadraticCost:
     matrix
         Symmetric positive-semidefinite Q with Q66 = 1, shape (6, 6); Q_ij multiplies
         y^(i) y^(j), unit s^(i + j - 12).
+    is_sum_of_squares
+        Whether Q has been made as one, which spares the check.
 
     """
 
     matrix: FloatArray
+    is_sum_of_squares: InitVar[bool] = False
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, is_sum_of_squares: bool) -> None:
         """Refuse what has no unique minimum."""
         matrix = np.array(self.matrix, dtype=float)
         object.__setattr__(self, 'matrix', matrix)
         matrix.setflags(write=False)
+        if is_sum_of_squares:
+            return
         if matrix.shape != (ORDER, ORDER):
             raise InvalidCost(f'Q must be 6 x 6 (36 numbers), got shape {matrix.shape}')
         infinite = np.argwhere(~np.isfinite(matrix))
@@ -86,11 +92,8 @@ class QuadraticCost:
         (21) of docs/derivation.md; `eq:ode` of the paper.
 
         """
-        alternating = self.matrix * (-1.0) ** np.arange(1, ORDER + 1)[:, None]
-        # Antidiagonals i + j = 2k; those with an odd sum integrate to boundary terms and drop out.
-        flipped = np.fliplr(alternating)
-        sums = [np.trace(flipped, ORDER + 1 - 2 * k) for k in range(1, ORDER + 1)]
-        return np.array([0.0, *sums])
+        coefficients: FloatArray = _antidiagonals() @ self.matrix.ravel()
+        return coefficients
 
 
 def strategy_cost(
@@ -134,21 +137,26 @@ def strategy_cost(
         if custom is None:
             raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')
         return QuadraticCost(matrix=custom)
-    matrix = _square(ORDER, 1.0)
-    if strategy in (Strategy.MIN_CONTROL_EFFORT, Strategy.MIXED):
-        effort = np.zeros(ORDER)
-        effort[: len(flat_map.effort) - 1] = flat_map.effort[1:]
-        matrix += r**WEIGHT_EXPONENT * np.outer(effort, effort)
-    if strategy in (Strategy.MIN_POTENTIAL_ENERGY, Strategy.MIXED):
-        matrix += _square(2, p**WEIGHT_EXPONENT)
-    return QuadraticCost(matrix=matrix)
-
-
-def _square(order: int, weight: float) -> FloatArray:
-    """Return Q of weight times the squared derivative of one order."""
     matrix = np.zeros((ORDER, ORDER))
-    matrix[order - 1, order - 1] = weight
-    return matrix
+    if strategy in (Strategy.MIN_CONTROL_EFFORT, Strategy.MIXED):
+        effort = flat_map.effort[1:]
+        matrix[: len(effort), : len(effort)] = r**WEIGHT_EXPONENT * np.multiply.outer(
+            effort, effort
+        )
+    if strategy in (Strategy.MIN_POTENTIAL_ENERGY, Strategy.MIXED):
+        matrix[1, 1] += p**WEIGHT_EXPONENT
+    matrix[-1, -1] = 1.0
+    return QuadraticCost(matrix=matrix, is_sum_of_squares=True)
+
+
+@cache
+def _antidiagonals() -> FloatArray:
+    """Return the matrix that takes Q row by row to the sums of (-1)^i Q_ij over i + j = 2k."""
+    i, j = np.indices((ORDER, ORDER)) + 1
+    sums = np.arange(ORDER + 1)[:, None, None]
+    # Those with an odd sum of indices integrate to boundary terms and drop out.
+    table: FloatArray = np.where(i + j == 2 * sums, (-1.0) ** i, 0.0)
+    return table.reshape(ORDER + 1, ORDER * ORDER)
 
 
 def _check_semidefinite(matrix: FloatArray) -> None:

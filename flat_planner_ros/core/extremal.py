@@ -12,26 +12,22 @@ mechanism without a special case.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from itertools import pairwise
 
 from flat_planner_ros.core.errors import UncertifiedPlan
-from flat_planner_ros.core.motion_law import Mode, MotionLaw, normalised_jet
+from flat_planner_ros.core.modes import Mode
+from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.roots import Cluster, clusters
+from flat_planner_ros.core.solutions import ALTERNATING, Block, block_of, CONDITIONS
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import factorial
 
 FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
-CONDITIONS = 6
-"""Conditions at either end: the value and five derivatives."""
+_ORDERS = np.arange(CONDITIONS + 1.0)
 
-SERIES_LENGTH = 64
-"""Terms of a cluster's power series; clusters as wide as the links allow need about fifty."""
-
-EQUILIBRATIONS = 12
-"""Sweeps that scale rows and columns of the boundary conditions to unit size."""
+RESIDUAL_STEPS = 1
+"""Corrections of the solved boundary conditions by their own residual."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,24 +67,36 @@ def extremal(coefficients: FloatArray, duration: float, jets: Jets) -> MotionLaw
 
     """
     half = 0.5 * duration
-    powers = half ** np.arange(CONDITIONS, dtype=float)
-    start, end = jets.start * powers, jets.end * powers
-    alternating = (-1.0) ** np.arange(CONDITIONS)
-    found = clusters(coefficients * half ** (2.0 * np.arange(CONDITIONS, -1, -1)))
+    powers = half**_ORDERS
+    start, end = jets.start * powers[:CONDITIONS], jets.end * powers[:CONDITIONS]
+    found = clusters(coefficients * powers[::-1] ** 2)
     middle = 0.5 * (jets.start[0] + jets.end[0])
-    modes = [Mode(rate=0j, origin=0, coefficients=np.array([complex(middle)]))]
+    modes = [Mode(rate=0j, origin=0, coefficients=np.array([complex(middle)]))] if middle else []
+    mirrored = ALTERNATING * start
     for parity in (-1.0, 1.0):
         # Right-hand side of the law's odd or even part about the middle, at the end x = 1.
-        target = 0.5 * (end + parity * alternating * start)
+        target = 0.5 * (end + parity * mirrored)
         target[0] -= middle if parity > 0.0 else 0.0
         if target.any():
-            modes.extend(_fitted(_basis(found, parity), target))
+            modes.extend(_fitted(found, parity, target))
     return MotionLaw(duration=duration, modes=tuple(modes))
 
 
 def euler_lagrange_residual(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> float:
+    """Return how far a law is from stationary over some times, as `stationarity_residual`."""
+    return stationarity_residual(coefficients, law.jet(t, 2 * CONDITIONS))
+
+
+def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
     """
-    Return how far a law is from stationary.
+    Return how far derivatives are from fulfilling the Euler-Lagrange equation.
+
+    Parameters
+    ----------
+    coefficients
+        a_0 ... a_6, shape (7,).
+    jet
+        Derivatives 0 to 12 at some times, shape (13, m).
 
     Returns
     -------
@@ -97,111 +105,71 @@ def euler_lagrange_residual(coefficients: FloatArray, law: MotionLaw, t: FloatAr
         magnitudes [-].
 
     """
-    orders = 2 * np.flatnonzero(coefficients)
-    terms = coefficients[orders // 2, None] * law.jet(t, 2 * CONDITIONS)[orders]
+    terms = coefficients[1:, None] * jet[2::2]
     size = np.abs(terms).sum(axis=0).max()
     return float(np.abs(terms.sum(axis=0)).max() / size) if size > 0.0 else 0.0
 
 
 def conserved_momentum(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> FloatArray:
+    """Return the conserved momentum of a law at some times, as `momentum_of`."""
+    return momentum_of(coefficients, law.jet(t, 2 * CONDITIONS - 1))
+
+
+def momentum_of(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
     """
     Return the first integral -sum_k a_k y^(2k - 1) of the Euler-Lagrange equation.
 
     Constant along an extremal; times the distance it is the cost of a rest-to-rest motion
-    ((35) of docs/derivation.md), shape of t.
+    ((35) of docs/derivation.md), shape (m,).
 
     """
-    orders = 2 * np.arange(1, CONDITIONS + 1) - 1
-    momentum: FloatArray = -coefficients[1:] @ law.jet(t, orders[-1])[orders]
+    momentum: FloatArray = -coefficients[1:] @ jet[1::2]
     return momentum
 
 
-Function = tuple[Mode, ...]
-"""One odd or even solution: a mode, with its mirror image unless it is symmetric by itself."""
-
-
-def _basis(found: Sequence[Cluster], parity: float) -> list[Function]:
-    """Return six independent solutions of one parity, slow ones first."""
+def _fitted(found: Sequence[Cluster], parity: float, target: FloatArray) -> list[Mode]:
+    """Return the modes of the combination of solutions that meets a jet at x = 1."""
     ordered = sorted(found, key=lambda cluster: abs(cluster.centre))
-    return [f for cluster in ordered for f in _functions(cluster, parity)]
-
-
-def _functions(cluster: Cluster, parity: float) -> list[Function]:
-    """Return the solutions of one parity that a cluster contributes."""
-    centre = cluster.centre
-    if centre == 0.0:
-        # The equation of this cluster is even itself: every second solution has the parity.
-        table = _power_series(cluster.factor)[(0 if parity > 0.0 else 1) :: 2]
-        return [(Mode(rate=0j, origin=0, coefficients=row),) for row in table]
-    table = _power_series(cluster.factor)
-    if centre.real == 0.0:
-        # conj(f_j(-x)) = (-1)^j f_j(x): Re f_j has the parity of j, Im f_j the other one.
-        even = np.arange(len(table)) % 2 == 0
-        factors = np.where(even == (parity > 0.0), 1.0, -1j)
-        rows = factors[:, None] * table
-        return [(Mode(rate=centre, origin=0, coefficients=row),) for row in rows]
-    if centre.imag != 0.0:
-        table = np.concatenate([table, -1j * table]).astype(complex)
-    modes = [Mode(rate=centre, origin=1, coefficients=row) for row in table]
-    return [(mode, mode.mirrored(parity)) for mode in modes]
-
-
-def _power_series(factor: ComplexArray) -> ComplexArray:
-    """
-    Return the solutions of a cluster's own equation as power series.
-
-    Parameters
-    ----------
-    factor
-        Monic characteristic polynomial, descending, shape (m + 1,).
-
-    Returns
-    -------
-    ComplexArray
-        Row j has its j-th derivative 1 and all others below m zero at 0, shape (m, terms).
-
-    """
-    size = len(factor) - 1
-    table = np.zeros((size, SERIES_LENGTH), dtype=complex)
-    table[:, :size] = np.eye(size)
-    tail = -factor[:0:-1]
-    if tail.any():
-        for k in range(size, SERIES_LENGTH):
-            table[:, k] = table[:, k - size : k] @ tail
-    else:
-        table = table[:, :size]
-    return np.asarray(table / _factorials(table.shape[1]), dtype=complex)
-
-
-@cache
-def _factorials(count: int) -> FloatArray:
-    """Return 0! ... (count - 1)!."""
-    return np.asarray(factorial(np.arange(count)), dtype=float)
-
-
-def _fitted(basis: Sequence[Function], target: FloatArray) -> list[Mode]:
-    """Return the modes of the combination of a basis that meets a jet at x = 1."""
-    end = (np.array([2.0]), np.array([0.0]))
-    matrix = np.array([normalised_jet(f, *end, CONDITIONS - 1)[:, 0] for f in basis]).T
-    rows, columns = _equilibration(matrix)
+    blocks = [block_of(cluster, parity) for cluster in ordered]
+    matrix = np.array([column for block in blocks for column in block.columns]).T
+    rows = _row_factors([block.growth for block in blocks for _ in block.columns])
+    matrix *= rows[:, None]
+    columns = 1.0 / np.abs(matrix).max(axis=0)
+    matrix *= columns
     try:
-        scaled = np.linalg.solve(rows[:, None] * matrix * columns, rows * target)
+        inverse = np.linalg.inv(matrix)
     except np.linalg.LinAlgError as error:
         raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
-    weights = columns * scaled
-    return [
-        mode.scaled(weight)
-        for weight, function in zip(weights, basis, strict=True)
-        for mode in function
-    ]
+    target = rows * target
+    weights = inverse @ target
+    for _ in range(RESIDUAL_STEPS):
+        weights += inverse @ (target - matrix @ weights)
+    return _combined(blocks, columns * weights, parity)
 
 
-def _equilibration(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return row and column factors: fast and slow modes differ by powers of their rates."""
-    rows, columns = np.ones(len(matrix)), np.ones(len(matrix))
-    size = np.abs(matrix)
-    columns = 1.0 / size.max(axis=0)
-    for _ in range(EQUILIBRATIONS):
-        rows = rows / np.sqrt((rows[:, None] * size * columns).max(axis=1))
-        columns = columns / np.sqrt((rows[:, None] * size * columns).max(axis=0))
-    return rows, columns
+def _combined(blocks: Sequence[Block], weights: FloatArray, parity: float) -> list[Mode]:
+    """Return one mode for each block, with its mirror image unless it is symmetric by itself."""
+    modes, first = [], 0
+    for block in blocks:
+        last = first + len(block.series)
+        coefficients = (weights[first:last, None] * block.series).sum(axis=0)
+        mode = Mode(rate=block.rate, origin=block.origin, coefficients=coefficients)
+        modes.append(mode)
+        if block.origin != 0:
+            modes.append(mode.mirrored(parity))
+        first = last
+    return modes
+
+
+def _row_factors(rates: Sequence[float]) -> FloatArray:
+    """
+    Return factors of the conditions after which each solution is largest in its own one.
+
+    The k-th derivative of a solution grows like its rate to the power k. With rates b in ascending
+    order and factors e_k / e_(k-1) = 1 / sqrt(b_(k-1) b_k), entry e_k b_i^k is largest at k = i:
+    fast solutions meet the high derivatives and slow ones the low, whatever their rates.
+    """
+    factors = [1.0]
+    for slow, fast in pairwise(rates):
+        factors.append(factors[-1] / (slow * fast) ** 0.5)
+    return np.array(factors)

@@ -7,7 +7,9 @@ method, a cluster as one factor of the polynomial, which stays well conditioned 
 do not (docs/derivation.md, section 5).
 """
 
+from cmath import sqrt
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +23,20 @@ LINK = 2.5
 RELATIVE_LINK = 0.3
 """Roots beta closer than this share of their decay rate also share a cluster [-]."""
 
+PAIR_LINK = 0.1
+"""Two roots alone may come as close as this and still be told apart at a loss of one digit [-]."""
+
+PAIR_RELATIVE_LINK = 0.02
+"""The same as a share of their modulus, which bounds the loss in the roots themselves [-]."""
+
 REFINEMENTS = 3
 """Newton steps on every factor; each about squares the error of the companion eigenvalues."""
+
+MAX_STEPS = 8
+"""Newton steps on a root by itself, which stop earlier once they have converged."""
+
+CONVERGED = 1e-9
+"""Relative step whose square is far below the last digit: the step after it changes nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,6 +72,9 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
     zeros = int(np.flatnonzero(coefficients)[0])
     reduced = coefficients[zeros:]
     squares = _companion_roots(reduced)
+    separate = _separate(reduced.tolist(), squares.tolist(), zeros)
+    if separate is not None:
+        return separate
     groups = _groups(np.concatenate([np.zeros(zeros, dtype=complex), squares]))
     members = [np.array([i - zeros for i in group if i >= zeros], dtype=int) for group in groups]
     for _ in range(REFINEMENTS):
@@ -75,13 +92,63 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
 def _companion_roots(ascending: FloatArray) -> ComplexArray:
     """Return the roots, conjugates exact; scaled to size one, so that nothing overflows."""
     descending = ascending[::-1]
-    powers = np.arange(1, len(descending))
-    if len(powers) == 0:
+    degree = len(descending) - 1
+    if degree == 0:
         return np.zeros(0, dtype=complex)
-    scale = float(np.max(np.abs(descending[1:]) ** (1.0 / powers)))
-    scaled = np.concatenate([[1.0], descending[1:] / scale**powers])
-    roots: ComplexArray = np.asarray(scale * np.roots(scaled), dtype=complex)
+    scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(descending.tolist()) if n)
+    companion = np.eye(degree, k=-1)
+    companion[0] = -descending[1:] / scale ** np.arange(1.0, degree + 1.0)
+    roots: ComplexArray = scale * np.linalg.eigvals(companion).astype(complex)
     return roots
+
+
+def _separate(ascending: list[float], squares: list[complex], zeros: int) -> list[Cluster] | None:
+    """Return one cluster for each root and one for those at zero, None unless all are apart."""
+    roots: list[complex] = []
+    for z in squares:
+        if z.imag >= 0.0:
+            polished = _polished(ascending, z)
+            if polished is None:
+                return None
+            roots.append(sqrt(polished))
+    for i, beta in enumerate(roots):
+        modulus = abs(beta)
+        # Half the distance to its mirror image or its conjugate.
+        near = 0.5 * max(PAIR_LINK, PAIR_RELATIVE_LINK * modulus)
+        if modulus <= LINK or beta.real <= near or 0.0 != beta.imag <= near:
+            return None
+        for other in roots[:i]:
+            # The images of two roots are at least as far apart as they are in the quadrant.
+            reach = max(LINK, RELATIVE_LINK * min(beta.real, other.real))
+            if abs(beta - other) <= reach:
+                return None
+    central = Cluster(centre=0j, factor=_monomial(2 * zeros))
+    return [central, *(Cluster(centre=beta, factor=_monomial(1)) for beta in roots)]
+
+
+def _polished(ascending: list[float], z: complex) -> complex | None:
+    """Return a root after Newton steps, None if they do not converge."""
+    for _ in range(MAX_STEPS):
+        value, slope = 0j, 0j
+        for a in reversed(ascending):
+            slope = slope * z + value
+            value = value * z + a
+        if slope == 0.0:
+            return None
+        step = value / slope
+        z -= step
+        if abs(step) <= CONVERGED * abs(z):
+            return z
+    return None
+
+
+@cache
+def _monomial(degree: int) -> ComplexArray:
+    """Return D^degree, descending."""
+    factor = np.zeros(degree + 1, dtype=complex)
+    factor[0] = 1.0
+    factor.setflags(write=False)
+    return factor
 
 
 def _groups(squares: ComplexArray) -> list[list[int]]:

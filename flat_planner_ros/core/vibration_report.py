@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
 
+from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest
+from flat_planner_ros.core.identification import ActuatedJoints, StiffnessEstimate
 from flat_planner_ros.core.oscillation import OscillationFit
 
 
@@ -37,6 +39,10 @@ class MonitorSettings:
         Damped frequency expected of the oscillation [Hz], or ``None``.
     expected_damping_ratio
         Its damping ratio [-], or ``None``.
+    arm
+        Nominal model whose stiffness and damping are estimated, or ``None`` for no estimate.
+    actuated_joints
+        Whether the actuated joints are free or held after a motion.
 
     """
 
@@ -47,6 +53,8 @@ class MonitorSettings:
     timeout: float = 0.5
     expected_frequency: float | None = None
     expected_damping_ratio: float | None = None
+    arm: PlanarArm | None = None
+    actuated_joints: ActuatedJoints = ActuatedJoints.AUTO
 
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""
@@ -100,6 +108,8 @@ class VibrationReport:
         Time from T to the last sample used [s].
     samples
         Number of samples in the window [-].
+    estimate
+        Stiffness and damping of the passive joint, ``None`` without a model to compare with.
 
     """
 
@@ -117,6 +127,7 @@ class VibrationReport:
     rms_effort: tuple[float | None, ...]
     window: float
     samples: int
+    estimate: StiffnessEstimate | None = None
 
     @property
     def amplitude(self) -> float | None:

@@ -21,16 +21,14 @@ from flat_planner_ros.core import (
     Residual,
     select,
 )
+from flat_planner_ros.ros.point_writer import NANOSECONDS, trajectory_bytes
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 FloatArray = NDArray[np.float64]
-
-NANOSECONDS = 1_000_000_000
-"""In one second."""
 
 
 def seconds(time: Time | Duration) -> float:
@@ -40,10 +38,8 @@ def seconds(time: Time | Duration) -> float:
 
 def time_msg(time: float) -> Time:
     """Return the stamp of an absolute time [s]."""
-    # Split first: a product of some 1e18 would round off the last hundred nanoseconds.
-    sec, fraction = divmod(time, 1.0)
-    carry, nanosec = divmod(round(fraction * NANOSECONDS), NANOSECONDS)
-    return Time(sec=int(sec) + carry, nanosec=nanosec)
+    sec, nanosec = _split(time)
+    return Time(sec=sec, nanosec=nanosec)
 
 
 def duration_msg(duration: float) -> Duration:
@@ -226,34 +222,31 @@ def profile_from_trajectory(
     )
 
 
-def command_msg(
+def command_bytes(
     motion: Motion,
     joints: Sequence[str],
     *,
     include_passive_joint: bool = True,
     include_effort: bool = True,
     absolute_stamp: bool = True,
-) -> JointTrajectory:
-    """Return the command of a motion, as joint_trajectory_controller plays it."""
+) -> bytes:
+    """Return the command of a motion, serialised, as joint_trajectory_controller plays it."""
     samples = motion.samples
     count = len(joints) if include_passive_joint else len(joints) - 1
     tables = [samples.positions, samples.velocities, samples.accelerations]
     if include_effort:
         tables.append(samples.efforts)
-    msg = _trajectory_msg(joints[:count], samples.times, [table[:, :count] for table in tables])
-    if absolute_stamp:
-        msg.header.stamp = time_msg(motion.start)
-    return msg
+    start = motion.start if absolute_stamp else 0.0
+    tables = [table[:, :count] for table in tables]
+    return trajectory_bytes(joints[:count], _split(start), samples.times, tables)
 
 
-def flat_plan_msg(motion: Motion) -> JointTrajectory:
-    """Return the flat outputs of a motion and the higher derivatives of y1."""
+def flat_plan_bytes(motion: Motion) -> bytes:
+    """Return the flat outputs of a motion and the higher derivatives of y1, serialised."""
     flat = motion.samples.flat
     names = [f'y{k + 1}' for k in range(len(flat))] + ['y1_d3']
     tables = [np.vstack([flat[:, k], flat[0, k + 3]]).T for k in range(3)]
-    msg = _trajectory_msg(names, motion.samples.times, tables)
-    msg.header.stamp = time_msg(motion.start)
-    return msg
+    return trajectory_bytes(names, _split(motion.start), motion.samples.times, tables)
 
 
 def reference_msg(samples: PlanSamples, joints: Sequence[str], now: float) -> JointState:
@@ -291,18 +284,12 @@ def _joint_state_msg(
     return msg
 
 
-def _trajectory_msg(
-    names: Sequence[str], times: FloatArray, tables: Sequence[FloatArray]
-) -> JointTrajectory:
-    """Return positions, velocities, accelerations and perhaps efforts as points."""
-    fields = ('positions', 'velocities', 'accelerations', 'effort')[: len(tables)]
-    points = []
-    for i, time in enumerate(times.tolist()):
-        point = JointTrajectoryPoint(time_from_start=duration_msg(time))
-        for field, table in zip(fields, tables, strict=True):
-            setattr(point, field, _doubles(table[i]))
-        points.append(point)
-    return JointTrajectory(joint_names=list(names), points=points)
+def _split(time: float) -> tuple[int, int]:
+    """Return an absolute time [s] in seconds and nanoseconds."""
+    # Split first: a product of some 1e18 would round off the last hundred nanoseconds.
+    sec, fraction = divmod(time, 1.0)
+    carry, nanosec = divmod(round(fraction * NANOSECONDS), NANOSECONDS)
+    return int(sec) + carry, nanosec
 
 
 def _doubles(values: FloatArray) -> array:

@@ -3,9 +3,20 @@
 from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flat_planner_ros.core import Goal, Level, Motion, RequestRejected, VibrationReport
+from flat_planner_ros.core import (
+    ActuatedJoints,
+    Adoption,
+    Goal,
+    InvalidRequest,
+    Level,
+    Motion,
+    ReportedEstimate,
+    RequestRejected,
+    StiffnessEstimate,
+    VibrationReport,
+)
 from flat_planner_ros.ros.conversions import time_msg
-from flat_planner_ros.ros.interfaces import ERROR_CODES, REPORT_NAME, STATUS_NAME
+from flat_planner_ros.ros.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
 
 ECHO_LENGTH = 16
 """Most entries of a goal's list that a verdict repeats."""
@@ -102,6 +113,58 @@ def finished_status(motion: Motion) -> DiagnosticStatus:
     return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
 
 
+def adopted_status(adoption: Adoption) -> DiagnosticStatus:
+    """Return the notice that the nominal model has changed."""
+    estimate, former, arm = adoption.estimate, adoption.former, adoption.arm
+    message = (
+        f'stiffness {former.stiffness:.6g} -> {arm.stiffness:.6g} N m/rad, damping '
+        f'{former.damping:.4g} -> {arm.damping:.4g} N m s/rad, estimated after the motion that '
+        f'started at {estimate.start_time:.3f} s'
+    )
+    values: Values = {
+        'state': 'ADOPTED',
+        'stiffness': arm.stiffness,
+        'stiffness_std': estimate.stiffness_std,
+        'stiffness_former': former.stiffness,
+        'damping': arm.damping,
+        'damping_std': estimate.damping_std,
+        'damping_former': former.damping,
+        'estimate_basis': estimate.case.value,
+        'start_time': f'{estimate.start_time:.9f}',
+    }
+    return status_msg(MODEL_NAME, DiagnosticStatus.OK, message, values)
+
+
+def reported_estimate(msg: DiagnosticArray) -> ReportedEstimate | None:
+    """
+    Return the estimate in a monitor's report, None if it has been withheld.
+
+    Raises
+    ------
+    InvalidRequest
+        The report has an estimate that cannot be read.
+
+    """
+    for status in msg.status:
+        values = {pair.key: pair.value for pair in status.values}
+        if status.name != REPORT_NAME or 'stiffness_estimate' not in values:
+            continue
+        try:
+            return ReportedEstimate(
+                start_time=float(values['start_time']),
+                joint=values['joint'],
+                stiffness=float(values['stiffness_estimate']),
+                stiffness_std=float(values['stiffness_std']),
+                damping=float(values['damping_estimate']),
+                damping_std=float(values['damping_std']),
+                case=ActuatedJoints(values['estimate_basis']),
+                inertia=float(values['estimate_inertia']),
+            )
+        except (KeyError, ValueError) as error:
+            raise InvalidRequest(f'estimate with missing or unreadable {error}') from error
+    return None
+
+
 def report_status(report: VibrationReport) -> DiagnosticStatus:
     """Return what a motion has left behind."""
     return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _of_report(report))
@@ -150,6 +213,21 @@ def _of_report(report: VibrationReport) -> Values:
         'window': report.window if seen else None,
         'samples': report.samples,
         'fit_rms': report.fit_rms,
+        **_of_estimate(report.estimate),
+    }
+
+
+def _of_estimate(estimate: StiffnessEstimate | None) -> Values:
+    """Return an estimate that can be trusted, else nothing."""
+    if estimate is None or not estimate.trustworthy or estimate.case is None:
+        return {}
+    return {
+        'stiffness_estimate': estimate.stiffness,
+        'stiffness_std': estimate.stiffness_std,
+        'damping_estimate': estimate.damping,
+        'damping_std': estimate.damping_std,
+        'estimate_basis': estimate.case.value,
+        'estimate_inertia': estimate.inertia,
     }
 
 

@@ -26,12 +26,14 @@ REFERENCE = '~/reference'
 STATUS = '~/status'
 REPLAN = '~/replan'
 STOP = '~/stop'
+ADOPT = '~/adopt_estimate'
 
 RESET = '~/reset'
 RESIDUAL = '~/residual'
 REPORT = '~/report'
 
 STATUS_NAME = 'flat_planner: goal'
+MODEL_NAME = 'flat_planner: model'
 REPORT_NAME = 'flat_monitor: residual oscillation'
 
 RELIABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from flat_planner_ros.core import MonitorSettings, PlanarArm
+from flat_planner_ros.core import ActuatedJoints, MonitorSettings, PlanarArm
 from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
 
 ROWS = [
@@ -39,6 +39,12 @@ ROWS = [
         lower=0.01,
         upper=60.0,
     ),
+    Row(
+        name='actuated_joints',
+        default=MonitorSettings.actuated_joints.value,
+        description='what the actuated joints do after a motion; auto = seen from the samples',
+        choices=tuple(joints.value for joints in ActuatedJoints),
+    ),
 ]
 """All parameters of the monitor node."""
 
@@ -69,6 +75,8 @@ def build(values: Values) -> MonitorSettings:
         timeout=values['timeout'],
         expected_frequency=frequency,
         expected_damping_ratio=damping_ratio,
+        arm=arm,
+        actuated_joints=ActuatedJoints(values['actuated_joints']),
     )
 
 

@@ -1,13 +1,24 @@
 """The life of a process of nodes: start, spin, and a clear end."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+import os
+import signal
 import sys
+from threading import Event
 
 from flat_planner_ros.core import FlatPlannerError
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+EXECUTOR = 'FLAT_PLANNER_EXECUTOR'
+"""Environment variable: `events`, the default where ROS has it, or `single`."""
+
+SPIN_PERIOD = 0.1
+"""Longest wait in the executor [s]; without one an EventsExecutor would never run a callback."""
 
 
 def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = None) -> int:
@@ -29,30 +40,62 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
 
     """
     nodes: list[Node] = []
-    executor = None
-    try:
-        # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
+    with _signals_caught() as interrupted:
         try:
-            rclpy.init(args=args)
-            executor = SingleThreadedExecutor()
-            for create in creators:
-                nodes.append(create())
-        except (FlatPlannerError, ParameterException, RuntimeError) as error:
-            if executor is not None and not rclpy.ok():
-                return 0  # A signal came while the nodes were made.
-            print(f'cannot start: {" ".join(str(error).split())}', file=sys.stderr)
-            return 1
-        for node in nodes:
-            executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except RuntimeError:
-        # A signal may end the context in the middle of a callback, which then fails to publish.
-        if rclpy.ok():
-            raise
-    finally:
-        for node in nodes:
-            node.destroy_node()
-        rclpy.try_shutdown()
+            # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
+            try:
+                rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+                executor = _new_executor()
+                for create in creators:
+                    nodes.append(create())
+                    executor.add_node(nodes[-1])
+            except (FlatPlannerError, ParameterException, RuntimeError) as error:
+                print(f'cannot start: {" ".join(str(error).split())}', file=sys.stderr)
+                return 1
+            while rclpy.ok() and not interrupted.is_set():
+                executor.spin_once(timeout_sec=SPIN_PERIOD)
+        except ExternalShutdownException:
+            pass
+        finally:
+            for node in nodes:
+                node.destroy_node()
+            rclpy.try_shutdown()
     return 0
+
+
+@contextmanager
+def _signals_caught() -> Iterator[Event]:
+    """
+    Turn the first SIGINT or SIGTERM into an event; a second one acts as ever.
+
+    Left to ROS, a signal would end the context in the middle of a callback, which then fails.
+    """
+    interrupted = Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    def interrupt(*_: object) -> None:
+        interrupted.set()
+        restore()
+
+    for number in before:
+        signal.signal(number, interrupt)
+    try:
+        yield interrupted
+    finally:
+        restore()
+
+
+def _new_executor() -> Executor:
+    """Return the executor that needs least time per message (benchmarks/README.md)."""
+    if os.environ.get(EXECUTOR, 'events') == 'events':
+        try:
+            from rclpy.experimental import EventsExecutor
+        except ImportError:
+            pass
+        else:
+            return EventsExecutor()
+    return SingleThreadedExecutor()

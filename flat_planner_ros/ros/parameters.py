@@ -228,6 +228,14 @@ def model_rows(*, read_only: bool) -> list[Row]:
     ]
 
 
+def model_parameters(*, stiffness: float, damping: float) -> list[Parameter]:
+    """Return the parameters of the passive joint with new values [N m/rad], [N m s/rad]."""
+    return [
+        Parameter('model.stiffness', value=stiffness),
+        Parameter('model.damping', value=damping),
+    ]
+
+
 EXAMPLE_ARM: Values = {
     'joints': ['joint1', 'joint2'],
     'model.inertia_star': [6.4e-4, 3.3e-5],

@@ -6,8 +6,10 @@ from time import perf_counter
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import (
+    AdoptionRefused,
     FlatPlannerError,
     Goal,
+    ModelTuner,
     Motion,
     PlannerSession,
     Reason,
@@ -15,7 +17,7 @@ from flat_planner_ros.core import (
 )
 from flat_planner_ros.ros import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.node_runner import run
-from flat_planner_ros.ros.parameters import NodeParameters
+from flat_planner_ros.ros.parameters import model_parameters, NodeParameters
 from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -34,6 +36,7 @@ class PlannerNode(Node):
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
+        self._tuner = ModelTuner()
         publish = self.create_publisher
         self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
@@ -44,6 +47,9 @@ class PlannerNode(Node):
         listen(JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.RELIABLE)
         listen(JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.RELIABLE)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        report = interfaces.of(interfaces.MONITOR, interfaces.REPORT)
+        listen(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
+        self.create_service(Trigger, interfaces.ADOPT, self._on_adopt)
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
         self.create_service(Trigger, interfaces.STOP, self._on_stop)
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
@@ -83,6 +89,46 @@ class PlannerNode(Node):
                 f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
             )
 
+    def _on_report(self, msg: DiagnosticArray) -> None:
+        """Keep an estimate, and adopt it at once if it follows the own last motion and may be."""
+        try:
+            estimate = diagnostics.reported_estimate(msg)
+        except FlatPlannerError as error:
+            self.get_logger().warning(f'report ignored: {error}')
+            return
+        if estimate is None:
+            return
+        self._tuner.hear(estimate)
+        motion = self._session.motion
+        if self._settings.auto_tune and motion is not None and estimate.is_of(motion.start):
+            try:
+                self._adopt()
+            except AdoptionRefused as refusal:
+                self.get_logger().info(f'auto_tune: {refusal}')
+
+    def _on_adopt(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Adopt the last trustworthy estimate."""
+        try:
+            response.message = self._adopt().message
+            response.success = True
+        except AdoptionRefused as refusal:
+            response.message = str(refusal)
+            response.success = False
+        return response
+
+    def _adopt(self) -> DiagnosticStatus:
+        """Set the parameters of the model to the last estimate, for the next plan."""
+        session = self._settings.session
+        adoption = self._tuner.propose(session.arm, session.joints[-1])
+        values = {'stiffness': adoption.arm.stiffness, 'damping': adoption.arm.damping}
+        result = self.set_parameters_atomically(model_parameters(**values))
+        if not result.successful:
+            raise AdoptionRefused(f'the parameters refuse the estimate: {result.reason}')
+        self._tuner.confirm(adoption)
+        status = diagnostics.adopted_status(adoption)
+        self._publish_status(status)
+        return status
+
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Plan the last goal again."""
         status = self._answer(lambda: self._session.last_goal)
@@ -120,20 +166,21 @@ class PlannerNode(Node):
             status = diagnostics.rejected_status(rejection, goal)
         else:
             elapsed = perf_counter() - started
-            status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)
+            # The verdict's peaks take a while: the plant need not wait for them.
             self._publish_motion(motion)
+            status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)
         self._publish_status(status)
         return status
 
     def _publish_motion(self, motion: Motion) -> None:
         """Publish the command first: its start is near."""
         settings = self._settings
-        plan = conversions.command_msg(motion, self._joints)
+        plan = conversions.command_bytes(motion, self._joints)
         if settings.session.execute:
             is_whole = settings.include_passive_joint and settings.include_effort
             command = plan
             if not (is_whole and settings.absolute_stamp):
-                command = conversions.command_msg(
+                command = conversions.command_bytes(
                     motion,
                     self._joints,
                     include_passive_joint=settings.include_passive_joint,
@@ -142,7 +189,7 @@ class PlannerNode(Node):
                 )
             self._command.publish(command)
         self._plan.publish(plan)
-        self._flat_plan.publish(conversions.flat_plan_msg(motion))
+        self._flat_plan.publish(conversions.flat_plan_bytes(motion))
 
     def _publish_status(self, status: DiagnosticStatus) -> None:
         """Publish and log a verdict."""

@@ -32,6 +32,8 @@ class PlannerSettings:
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
+    auto_tune
+        Whether estimates from the own last motion are adopted without being asked.
 
     """
 
@@ -40,6 +42,7 @@ class PlannerSettings:
     include_effort: bool
     absolute_stamp: bool
     reference_rate: float
+    auto_tune: bool
 
 
 ROWS = [
@@ -179,6 +182,11 @@ ROWS = [
         read_only=True,
     ),
     Row(
+        name='auto_tune',
+        default=False,
+        description='adopt each trustworthy estimate that the monitor makes after a motion',
+    ),
+    Row(
         name='stream_effort',
         default=False,
         description='stream ~/effort_commands; not yet available',
@@ -236,6 +244,7 @@ def build(values: Values) -> PlannerSettings:
         include_effort=values['command.include_effort'],
         absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
+        auto_tune=values['auto_tune'],
     )
 
 

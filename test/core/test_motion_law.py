@@ -1,6 +1,7 @@
 """Motion laws against the same functions differentiated in multiple precision."""
 
-from flat_planner_ros.core.motion_law import Mode, MotionLaw, normalised_jet
+from flat_planner_ros.core.modes import Mode
+from flat_planner_ros.core.motion_law import MotionLaw, normalised_jet
 import numpy as np
 import pytest
 

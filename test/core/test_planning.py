@@ -3,10 +3,11 @@
 import json
 from pathlib import Path
 
-from flat_planner_ros.core import planning
+from flat_planner_ros.core import planning, unit_motion
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import InvalidCost, InvalidRequest, NotFlat, UncertifiedPlan
+from flat_planner_ros.core.extremal import Jets
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
 from flat_planner_ros.core.simulation import EffortProfile, rollout
 import numpy as np
@@ -228,22 +229,26 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, const
 
 
 @pytest.mark.parametrize('damage', ['end', 'middle'])
-def test_certificates_see_a_law_that_is_wrong(monkeypatch, paper_arm, damage):
+def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
     """A law for other ends misses the boundary, one for another cost the optimality."""
-    compute = planning.extremal
+    compute = unit_motion.extremal
+    # A task that no other test has: nothing of it is in the cache.
+    arm = paper_arm_with(2e-5)
 
     def wrong(coefficients, duration, jets):
         if damage == 'middle':
             return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1], duration, jets)
-        return compute(coefficients, duration, jets).transformed(1.0 + 1e-8, 0.0)
+        far = Jets(start=jets.start, end=jets.end * (1.0 + 1e-8))
+        return compute(coefficients, duration, far)
 
-    monkeypatch.setattr(planning, 'extremal', wrong)
+    monkeypatch.setattr(unit_motion, 'extremal', wrong)
+    unit_motion.unit_motion.cache_clear()
+    request.addfinalizer(unit_motion.unit_motion.cache_clear)
     quantity = {'end': 'boundary', 'middle': 'optimality'}[damage]
     with pytest.raises(UncertifiedPlan, match=quantity):
-        plan(half_turn(), paper_arm, STRATEGIES['energy'])
+        plan(half_turn(), arm, STRATEGIES['energy'])
 
 
-@pytest.mark.filterwarnings('ignore::RuntimeWarning')
 @pytest.mark.parametrize(('distance', 'duration'), [(1e308, 1e-3), (1.0, 1e-70)])
 def test_refuses_what_leaves_double_precision(paper_arm, distance, duration):
     request = MotionRequest(start=[0.0, 0.0], final=[distance, 0.0], duration=duration)
@@ -414,6 +419,53 @@ def test_plans_are_linear_in_the_distance(name, paper_arm):
     np.testing.assert_allclose(two.rms_effort, 1e-3 * one.rms_effort, rtol=1e-9)
     np.testing.assert_allclose(two.peak_velocity, 1e-3 * one.peak_velocity, rtol=1e-9)
     assert two.cost_value == pytest.approx(1e-6 * one.cost_value, rel=1e-9)
+
+
+@pytest.mark.parametrize('name', STRATEGIES)
+def test_an_even_grid_is_the_law_at_its_times(name, paper_arm):
+    """Grids of one and of several chunks, short layers included."""
+    for duration, intervals in ((0.3, 7), (1.0, 1000), (4.0, 9001), (40.0, 10000)):
+        found = plan(half_turn(duration), paper_arm, STRATEGIES[name])
+        samples = found.sample(duration / intervals)
+        assert len(samples.times) == intervals + 1
+        expected = found.at(samples.times)
+        for table in ('planned', 'torque', 'flat', 'positions', 'efforts'):
+            one, other = getattr(samples, table), getattr(expected, table)
+            axis = -1 if table in ('planned', 'torque', 'flat') else 0
+            scale = np.abs(other).max(axis=axis, keepdims=True)
+            assert (np.abs(one - other) <= 1e-11 * scale).all()
+
+
+def test_samples_are_locked(paper_arm):
+    samples = plan(half_turn(), paper_arm, STRATEGIES['mixed']).sample(0.1)
+    for table in ('times', 'planned', 'torque', 'positions', 'efforts', 'flat'):
+        with pytest.raises(ValueError, match='read-only'):
+            getattr(samples, table)[...] = 0.0
+
+
+def test_another_distance_and_a_scaled_arm_share_a_unit_motion():
+    """Weights scale with the arm: r^8 tau^2 is the same for k times the arm and r / k^(1/4)."""
+    one = plan(half_turn(), paper_arm_with(2e-5), STRATEGIES['effort'])
+    shared = 0
+    for scale in 2.0 ** np.arange(-8.0, 17.0, 4.0):
+        arm = arm_of(*(scale * np.array([6.4e-4, 3.3e-5, 3e-3, 2e-5])))
+        options = PlanningOptions(
+            strategy=Strategy.MIN_CONTROL_EFFORT, r=150.0 / scale**0.25, p=0.0
+        )
+        request = MotionRequest(start=[0.3, 0.0], final=[0.8, 0.0], duration=1.0)
+        other = plan(request, arm, options)
+        shared += other.task.unit is one.task.unit
+        expected = scale * 0.5 / np.pi * one.sample(0.01).torque
+        assert_close(other.sample(0.01).torque, expected)
+    assert shared >= 5
+
+
+def test_rounding_of_coefficients_is_bounded():
+    values = np.random.default_rng(5).normal(size=1000) * 1e7
+    error = np.abs(unit_motion.rounded(values) - values)
+    assert (error <= unit_motion.KEY_ROUNDING * np.abs(values)).all()
+    assert error.max() > 0.0
+    assert len(np.unique(unit_motion.rounded(1.0 + np.arange(32) * 2.0**-52))) <= 3
 
 
 @pytest.mark.parametrize(

@@ -138,8 +138,11 @@ def test_a_motion_yields_one_report_with_what_was_simulated(bench):
     assert values.pop('settled') == 'false'
     assert values.pop('start_time') == '100.000000000'
     assert values.pop('end_time') == '100.500000000'
+    assert values.pop('estimate_basis') == 'held'  # joint 1 stands still
     numbers = {key: float(value) for key, value in values.items()}
     assert numbers.pop('fit_rms') < 1e-9
+    assert numbers.pop('stiffness_std') < 1e-9
+    assert numbers.pop('damping_std') < 1e-9
     assert numbers.pop('bias') == pytest.approx(0.0, abs=1e-9)
     assert numbers.pop('final_error.joint1') == pytest.approx(0.0, abs=1e-9)
     assert numbers.pop('final_error.joint2') == pytest.approx(0.0, abs=0.1 * AMPLITUDE)
@@ -156,6 +159,10 @@ def test_a_motion_yields_one_report_with_what_was_simulated(bench):
         'rms_effort.joint1': pytest.approx(sqrt(0.5), rel=1e-2),
         'window': pytest.approx(WINDOW),
         'samples': WINDOW * RATE + 1,
+        # (42) solved for stiffness and damping.
+        'stiffness_estimate': pytest.approx(3.3e-5 * (omega**2 + DECAY**2), rel=1e-6),
+        'damping_estimate': pytest.approx(2 * 3.3e-5 * DECAY, rel=1e-5),
+        'estimate_inertia': pytest.approx(3.3e-5),
     }
 
 

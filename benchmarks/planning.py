@@ -1,0 +1,185 @@
+"""Planning the paper's motion: cold, from the cached law, and beside other libraries."""
+
+from argparse import Namespace
+from importlib.util import find_spec
+from itertools import count
+from typing import NamedTuple
+import warnings
+
+from flat_planner_ros.core import MotionRequest, Plan, plan, PlanarArm
+from measurement import duration_text, Section, Timing, timing, verdict
+from peers import Peer, PEERS, Solver
+import problem
+
+COLD_TARGET = 250e-6
+"""Cold plan with its samples [s]."""
+
+CACHED_TARGET = 10e-6
+"""New distance from the cached law [s]."""
+
+OWN_ERROR = 1e-9
+"""Largest error of our answer relative to each derivative's peak [-]."""
+
+PEER_TARGETS = {
+    'SciPy solve_bvp, 1e-3': 100.0,
+    'SciPy solve_bvp, 1e-3, tuned': 100.0,
+    'CasADi, collocation (IPOPT)': 100.0,
+    'python-control point_to_point': 1000.0,
+}
+"""How many times longer than our cold plan these are to take."""
+
+PEER_BUDGET = 3.0
+"""Time for the calls of one peer [s]; one call at least."""
+
+STEP = 1e-6
+"""Difference of two durations, so that no law is known from before [s]."""
+
+_numbers = count(1)
+
+
+class Row(NamedTuple):
+    """One line of the table of libraries."""
+
+    name: str
+    cold: Timing
+    warm: Timing
+    error: float
+
+
+class Task(NamedTuple):
+    """What a plan is made from."""
+
+    request: MotionRequest
+    arm: PlanarArm
+
+
+def sections(options: Namespace) -> list[Section]:
+    """Return the tables of this benchmark."""
+    del options
+    own = _own_rows()
+    cold = own[1]
+    rows = [cold, *(row for peer in PEERS if (row := _peer_row(peer)) is not None)]
+    missing = [peer.name for peer in PEERS if find_spec(peer.module) is None]
+    return [_own_section(own), _peer_section(rows, missing)]
+
+
+def answer(made: Plan) -> problem.Answer:
+    """Return y to y^(6) and the torque of a plan at the 1001 times."""
+    jet = made.law.jet(problem.TIMES, problem.ORDERS - 1)
+    return problem.Answer(jet, problem.effort(jet))
+
+
+def new_task() -> Task:
+    """Return a task that nothing can be known of: a new arm and a duration never asked for."""
+    number = next(_numbers)
+    return Task(problem.request(duration=problem.DURATION + STEP * number), problem.arm())
+
+
+def new_distance() -> Task:
+    """Return a task that differs from the last ones in its distance alone."""
+    return Task(problem.request(distance=0.5 + 1e-3 * (next(_numbers) % 1000)), _KNOWN_ARM)
+
+
+_KNOWN_ARM = problem.arm()
+
+
+def _plan(task: Task) -> Plan:
+    return plan(task.request, task.arm, problem.OPTIONS)
+
+
+def _own_rows() -> list[Row]:
+    """Return our own planner with more and more of what a caller wants."""
+    known = _plan(Task(problem.request(), _KNOWN_ARM))
+    error = problem.error(answer(known))
+    assert error <= OWN_ERROR, f'the plan is wrong by {error:.3g}'
+    far = answer(_plan(Task(problem.request(distance=2.0 * problem.DISTANCE), _KNOWN_ARM)))
+    halved = problem.error(problem.Answer(0.5 * far.jet, 0.5 * far.effort))
+    assert halved <= OWN_ERROR, f'the rescaled plan is wrong by {halved:.3g}'
+    period = problem.DURATION / (problem.SAMPLES - 1)
+    steps = {
+        'the certified law': lambda task: _plan(task),
+        'and 1001 samples of y to y^(6), torque': lambda task: answer(_plan(task)),
+        'and 1001 samples of all joints and y': lambda task: _plan(task).sample(period),
+        'and its peaks and RMS values': lambda task: _with_peaks(_plan(task)),
+    }
+    return [
+        Row(name, timing(step, new_task), timing(step, new_distance), error)
+        for name, step in steps.items()
+    ]
+
+
+def _with_peaks(made: Plan) -> object:
+    return made.rms_effort, made.peak_effort, made.peak_velocity
+
+
+def _peer_row(peer: Peer) -> Row | None:
+    """Return a peer's times, nothing if it is not installed."""
+    if find_spec(peer.module) is None:
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')
+        solve = peer.prepare()
+        error = problem.error(solve())
+        assert error <= peer.error, f'{peer.name} is wrong by {error:.3g}'
+        cold = timing(lambda _: peer.prepare()(), budget=PEER_BUDGET, warm_up=0, least=1)
+        warm = _warm(solve)
+    return Row(peer.name, cold, warm, error)
+
+
+def _warm(solve: Solver) -> Timing:
+    return timing(lambda _: solve(), budget=PEER_BUDGET, warm_up=0, least=1)
+
+
+def _own_section(rows: list[Row]) -> Section:
+    """Return the table of our own times."""
+    cold_met = rows[1].cold.median <= COLD_TARGET
+    cached_met = rows[0].warm.median <= CACHED_TARGET
+    return Section(
+        "Planning the paper's motion",
+        ('plan', 'cold: median', 'worst', 'new distance: median', 'worst', 'error'),
+        [
+            (
+                row.name,
+                duration_text(row.cold.median),
+                duration_text(row.cold.worst),
+                duration_text(row.warm.median),
+                duration_text(row.warm.worst),
+                f'{row.error:.1g}',
+            )
+            for row in rows
+        ],
+        [
+            f'cold plan with 1001 samples, target {duration_text(COLD_TARGET)}: '
+            f'{verdict(cold_met)}',
+            f'new distance from the cached law, target {duration_text(CACHED_TARGET)}: '
+            f'{verdict(cached_met)}',
+        ],
+    )
+
+
+def _peer_section(rows: list[Row], missing: list[str]) -> Section:
+    """Return the table of all libraries, ratios first."""
+    own = rows[0]
+    notes = []
+    for row in rows[1:]:
+        if row.name in PEER_TARGETS:
+            ratio, target = row.cold.median / own.cold.median, PEER_TARGETS[row.name]
+            is_met = ratio >= target and own.error < row.error
+            notes.append(f'{row.name}, target {target:g} times: {verdict(is_met)}')
+    notes += [f'{name}: not installed' for name in missing]
+    return Section(
+        'Beside other libraries',
+        ('solver', 'cold / ours', 'prepared / ours', 'cold', 'prepared', 'error'),
+        [
+            (
+                'this planner' if row is own else row.name,
+                f'{row.cold.median / own.cold.median:.3g}',
+                f'{row.warm.median / own.warm.median:.3g}',
+                duration_text(row.cold.median),
+                duration_text(row.warm.median),
+                f'{row.error:.1g}',
+            )
+            for row in rows
+        ],
+        notes,
+    )

@@ -1,0 +1,195 @@
+"""The plant as a process: how fast it can be, and how evenly it keeps 1 kHz in real time."""
+
+from argparse import Namespace
+from time import monotonic, time
+from typing import NamedTuple
+
+from flat_planner_ros.core import plan
+from flat_planner_ros.ros import conversions, interfaces
+from measurement import Section, verdict
+import numpy as np
+import problem
+from processes import (
+    executors,
+    Listener,
+    listener,
+    NodeProcess,
+    processes,
+    SHIPPED,
+    stamp_of,
+    Usage,
+)
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+COMMAND = interfaces.of(interfaces.PLANNER, interfaces.COMMAND)
+"""Where the plant listens."""
+
+FREE_SECONDS = 10.0
+"""Time for which the plant runs as fast as it can [s]."""
+
+SPEED_TARGET = 20.0
+"""Simulated seconds per second for two joints at 200 Hz [-]."""
+
+RATE = 1000.0
+"""Rate of joint states in real time [Hz]."""
+
+COMPARED_SECONDS = 20.0
+"""Longest run in real time with another executor than the node's own [s]."""
+
+RATE_TOLERANCE = 0.01
+"""Deviation of the published rate that is fine [-]."""
+
+
+class Run(NamedTuple):
+    """
+    What was seen of a plant in real time.
+
+    Attributes
+    ----------
+    stamps, arrivals
+        Of each joint state [s].
+    usage
+        Of the plant's process.
+    warnings
+        What it complained about.
+
+    """
+
+    stamps: np.ndarray
+    arrivals: np.ndarray
+    usage: Usage
+    warnings: list[str]
+
+
+def sections(options: Namespace) -> list[Section]:
+    """Return the tables of this benchmark."""
+    return [_free_section(), _real_time_section(options.seconds)]
+
+
+def trajectory(start: float, duration: float, points: int = 1001) -> JointTrajectory:
+    """Return a motion of the paper's arm as a command or plan that starts at a time [s]."""
+    made = plan(problem.request(duration=duration), problem.arm(), problem.OPTIONS)
+    samples = made.sample(duration / (points - 1))
+    msg = JointTrajectory(joint_names=['joint1', 'joint2'])
+    msg.header.stamp = conversions.time_msg(start)
+    msg.points = [
+        JointTrajectoryPoint(
+            positions=samples.positions[i].tolist(),
+            velocities=samples.velocities[i].tolist(),
+            accelerations=samples.accelerations[i].tolist(),
+            effort=samples.efforts[i].tolist(),
+            time_from_start=conversions.duration_msg(samples.times[i]),
+        )
+        for i in range(len(samples.times))
+    ]
+    return msg
+
+
+def _free_section() -> Section:
+    """Measure the speed of a plant that owns the time."""
+    rows, speeds = [], []
+    for executor in executors():
+        speed, usage = _free_run(executor)
+        speeds.append(speed)
+        rows.append((executor, f'{speed:.3g}', f'{100.0 * usage.share:.0f} %'))
+    return Section(
+        'Plant as fast as it can, two joints, 200 Hz of joint states and /clock',
+        ('executor', 'simulated s per s', 'CPU'),
+        rows,
+        [f'target {SPEED_TARGET:g}: {verdict(speeds[0] >= SPEED_TARGET)}'],
+    )
+
+
+def _free_run(executor: str) -> tuple[float, Usage]:
+    """Return simulated seconds per second, and the work."""
+    parameters = {'publish_clock': 'true', 'real_time_factor': '0.0', 'publish_rate': '200.0'}
+    process = NodeProcess('plant', executor, parameters)
+    with processes(process), listener('free_listener') as ours:
+        seen: list[tuple[float, float]] = []
+        states: list[bytes] = []
+        ours.node.create_subscription(
+            Clock, '/clock', lambda m: seen.append((monotonic(), stamp_of(m))), 10, raw=True
+        )
+        ours.node.create_subscription(JointState, '/joint_states', states.append, 10, raw=True)
+        ours.spin_until(lambda: seen, 'a /clock')
+        command = ours.node.create_publisher(JointTrajectory, COMMAND, 10)
+        ours.spin_until(command.get_subscription_count, 'the plant')
+        command.publish(trajectory(seen[-1][1] + 20.0, 60.0))
+        process.look()
+        first = len(seen)
+        ours.spin(FREE_SECONDS)
+        usage = process.look()
+        assert process.is_running(), process.log
+        simulated, elapsed = np.subtract(seen[-1][::-1], seen[first][::-1])
+        assert states, 'joint states go with /clock'
+    return simulated / elapsed, usage
+
+
+def _real_time_section(seconds: float) -> Section:
+    """Measure a plant that follows the system's clock."""
+    rows, notes = [], []
+    for executor in executors():
+        is_compared = executor != SHIPPED
+        run = _real_time_run(executor, min(seconds, COMPARED_SECONDS) if is_compared else seconds)
+        gaps = np.rint(np.diff(run.stamps) * RATE).astype(int)
+        assert (gaps > 0).all(), 'joint states must not repeat or go back'
+        missed = int((gaps - 1).sum())
+        span = run.stamps[-1] - run.stamps[0]
+        rate = (len(run.stamps) - 1) / span
+        heard = (len(run.stamps) - 1) / (run.arrivals[-1] - run.arrivals[0])
+        lag = 1e3 * (run.arrivals - run.stamps)
+        rows.append(
+            (
+                executor,
+                f'{rate:.2f} Hz',
+                f'{heard:.2f} Hz',
+                f'{missed}',
+                f'{100.0 * run.usage.share:.0f} %',
+                ' / '.join(f'{np.percentile(lag, p):.2f}' for p in (50, 99, 100)),
+            )
+        )
+        if executor == SHIPPED:
+            is_met = missed == 0 and abs(heard / RATE - 1.0) <= RATE_TOLERANCE
+            notes.append(
+                f'no missed step, rate within 1 %: {verdict(is_met and not run.warnings)}'
+            )
+        notes += [f'{executor}: {line}' for line in run.warnings[:3]]
+    return Section(
+        f'Plant in real time, {RATE:g} Hz of joint states for {seconds:g} s (others: shorter)',
+        ('executor', 'stamped', 'heard', 'missed', 'CPU', 'lag p50 / p99 / worst [ms]'),
+        rows,
+        notes,
+    )
+
+
+def _real_time_run(executor: str, seconds: float) -> Run:
+    """Let a plant move and listen to it."""
+    process = NodeProcess('plant', executor, {'publish_rate': str(RATE)})
+    with processes(process), listener('real_time_listener') as ours:
+        seen: list[tuple[float, float]] = []
+        ours.node.create_subscription(
+            JointState,
+            '/joint_states',
+            lambda m: seen.append((stamp_of(m), time())),
+            1000,
+            raw=True,
+        )
+        ours.spin_until(lambda: seen, 'joint states')
+        _move(ours, seconds)
+        ours.spin(1.0)
+        process.look()
+        first = len(seen)
+        ours.spin(seconds)
+        usage = process.look()
+        assert process.is_running(), process.log
+        stamps, arrivals = np.array(seen[first:]).T
+        return Run(stamps, arrivals, usage, process.warnings)
+
+
+def _move(ours: Listener, seconds: float) -> None:
+    """Command a motion that lasts as long as the measurement."""
+    command = ours.node.create_publisher(JointTrajectory, COMMAND, 10)
+    ours.spin_until(command.get_subscription_count, 'the plant')
+    command.publish(trajectory(time() + 0.5, max(1.0, min(seconds, 60.0))))

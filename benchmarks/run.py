@@ -1,0 +1,91 @@
+"""Run the benchmarks and write their tables to results.md."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from datetime import date
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+import os
+from pathlib import Path
+import platform
+import sys
+
+BENCHMARKS = ('planning', 'scaling', 'node_path', 'plant', 'monitor', 'start_up')
+"""Modules with a function `sections`, in this order."""
+
+WITHOUT_ROS = ('planning', 'scaling')
+"""Those that need no ROS."""
+
+RESULTS = Path(__file__).parent / 'results.md'
+"""What a whole run writes."""
+
+THREADS = ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS', 'BLIS_NUM_THREADS')
+"""Variables that keep linear algebra to one thread; read when NumPy is imported."""
+
+VERSIONS = ('numpy', 'scipy', 'casadi', 'drake', 'control', 'matplotlib', 'rclpy')
+"""Packages that are named in the results."""
+
+
+def main() -> int:
+    """Run what is asked for."""
+    options = _options()
+    for variable in THREADS:
+        os.environ[variable] = '1'
+    # A graph of its own: other people's nodes would take part.
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    text = [*_machine()]
+    for name in options.only or BENCHMARKS:
+        if name not in WITHOUT_ROS and find_spec('rclpy') is None:
+            text.append(f'## {name}\n\nnot run: rclpy is not installed')
+            continue
+        for section in import_module(name).sections(options):
+            text.append(section.markdown())
+            print(f'\n{text[-1]}', flush=True)
+    if not options.only:
+        options.output.write_text('\n\n'.join(text) + '\n', encoding='utf-8')
+        print(f'\nwritten to {options.output}')
+    return 0
+
+
+def _options() -> Namespace:
+    """Return the command line's options."""
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument('only', nargs='*', choices=[*BENCHMARKS, []], help='all by default')
+    parser.add_argument('--seconds', type=float, default=60.0, help='of each run in real time')
+    parser.add_argument('--domain', type=int, default=101, help='ROS domain')
+    parser.add_argument('--output', type=Path, default=RESULTS, help='file for the tables')
+    return parser.parse_args()
+
+
+def _machine() -> Iterator[str]:
+    """Return what the numbers depend on."""
+    yield '# Results'
+    versions = [f'Python {platform.python_version()}']
+    for name in VERSIONS:
+        try:
+            versions.append(f'{name} {version(name)}')
+        except PackageNotFoundError:
+            versions.append(f'{name} not installed')
+    load = ', '.join(f'{value:.2g}' for value in os.getloadavg())
+    yield '\n'.join(
+        [
+            f'- {date.today().isoformat()}, {platform.system()} {platform.machine()}',
+            f'- {_processor()}, {len(os.sched_getaffinity(0))} cores, load {load} at the start',
+            f'- {", ".join(versions)}',
+        ]
+    )
+
+
+def _processor() -> str:
+    """Return the name of the processor."""
+    try:
+        lines = Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+        return next(line.split(':', 1)[1].strip() for line in lines if 'model name' in line)
+    except (OSError, StopIteration):
+        return platform.processor() or 'unknown processor'
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,31 @@
+"""Run one node under a given executor: spin_node.py NODE EXECUTOR [--ros-args ...]."""
+
+from importlib import import_module
+import sys
+
+from processes import new_executor
+import rclpy
+from rclpy.executors import ExternalShutdownException
+
+
+def main() -> None:
+    """Spin until the process is asked to end."""
+    name, executor_name, *arguments = sys.argv[1:]
+    rclpy.init(args=[sys.argv[0], *arguments])
+    module = import_module(f'flat_planner_ros.ros.{name}_node')
+    node = getattr(module, f'{name.capitalize()}Node')()
+    executor = new_executor(executor_name)
+    executor.add_node(node)
+    try:
+        # A spin without a timeout would starve the callbacks of an EventsExecutor.
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=0.1)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,75 @@
+"""From starting a node's process to the first answer of its service, and what it imports."""
+
+from argparse import Namespace
+import subprocess
+import sys
+from time import perf_counter
+
+from flat_planner_ros.ros import interfaces
+from measurement import duration_text, Section, Timing
+from processes import listener, NodeProcess, processes, SHIPPED
+from std_srvs.srv import Trigger
+
+STARTS = 5
+"""Starts of each node."""
+
+SERVICES = {
+    'planner': interfaces.of(interfaces.PLANNER, interfaces.STOP),
+    'plant': interfaces.of(interfaces.PLANT, interfaces.RESET),
+    'monitor': interfaces.of(interfaces.MONITOR, interfaces.RESET),
+}
+"""A service of each node that can be called at any time."""
+
+HEAVY = ('matplotlib', 'scipy.optimize', 'scipy.integrate', 'scipy.interpolate', 'scipy.signal')
+"""Modules that a node had better do without."""
+
+RCLPY = 'rclpy'
+"""The least that any node needs."""
+
+
+def sections(options: Namespace) -> list[Section]:
+    """Return the table of this benchmark."""
+    del options
+    least = Timing.of([_import_time(RCLPY) for _ in range(STARTS)])
+    rows = [('import rclpy alone', duration_text(least.median), duration_text(least.worst), '-')]
+    for node in SERVICES:
+        started = Timing.of([_start(node) for _ in range(STARTS)])
+        heavy = ', '.join(_heavy(node)) or 'none'
+        median, worst = duration_text(started.median), duration_text(started.worst)
+        rows.append((node, median, worst, heavy))
+    return [
+        Section(
+            'From the start of the process to the first answer of a service',
+            ('node', 'median', 'worst', 'heavy imports'),
+            rows,
+        )
+    ]
+
+
+def _import_time(module: str) -> float:
+    """Return the time of a process that imports one module [s]."""
+    start = perf_counter()
+    subprocess.run([sys.executable, '-c', f'import {module}'], check=True)
+    return perf_counter() - start
+
+
+def _start(node: str) -> float:
+    """Return the time to the first answer [s]."""
+    with listener('start_up_listener') as ours:
+        client = ours.node.create_client(Trigger, SERVICES[node])
+        start = perf_counter()
+        process = NodeProcess(node, SHIPPED, {})
+        with processes(process):
+            ours.spin_until(client.service_is_ready, f'the service of the {node}')
+            future = client.call_async(Trigger.Request())
+            ours.spin_until(future.done, f'an answer of the {node}')
+            elapsed = perf_counter() - start
+            assert future.result().message
+    return elapsed
+
+
+def _heavy(node: str) -> list[str]:
+    """Return the heavy modules that a node's module imports."""
+    code = f'import sys, flat_planner_ros.ros.{node}_node; print(*sys.modules)'
+    run = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True, text=True)
+    return [name for name in HEAVY if name in run.stdout.split()]

@@ -1,0 +1,129 @@
+"""Task: all that plans of one arm, cost and duration have in common, computed once and kept."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.cost import QuadraticCost, strategy_cost
+from flat_planner_ros.core.flatness import flat_map, FlatMap
+from flat_planner_ros.core.request import PlanningOptions
+from flat_planner_ros.core.solutions import CONDITIONS
+from flat_planner_ros.core.unit_motion import (
+    GRIDS_KEPT,
+    JET_ORDER,
+    MAX_KEPT_INTERVALS,
+    rounded,
+    unit_motion,
+    UnitMotion,
+)
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+MAX_NUMBER = 1e300
+"""Largest number in a plan; products with weights of order one still have room."""
+
+TASKS_KEPT = 64
+"""Combinations of arm, options and duration whose unit motion is remembered."""
+
+_ORDERS = np.arange(JET_ORDER + 1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """
+    What a plan is made from, besides its ends: the motion over 1 rad.
+
+    Attributes
+    ----------
+    cost
+        What is minimised.
+    flat_map
+        From the planned variable to the joints.
+    unit
+        The law in normalised time.
+    rates
+        Factors of its derivatives 0 to 6 in physical time, shape (7,) [1/s^k].
+    cost_value
+        Cost of 1 rad.
+    reach
+        Distance from which numbers overflow [rad].
+
+    """
+
+    cost: QuadraticCost
+    flat_map: FlatMap
+    unit: UnitMotion
+    rates: FloatArray
+    cost_value: float
+    reach: float
+
+    @cached_property
+    def rows(self) -> FloatArray:
+        """Torque and velocities of both joints from the unit motion's derivatives, (3, 7)."""
+        mapping = self.flat_map
+        rows = np.zeros((3, JET_ORDER + 1))
+        rows[0, : len(mapping.effort)] = mapping.effort
+        rows[1, 1 : len(mapping.output) + 1] = mapping.output
+        rows[2, 1 : len(mapping.deflection) + 1] = mapping.deflection
+        rows[1] -= rows[2]
+        rows *= self.rates
+        return rows
+
+    def grid(self, intervals: int) -> FloatArray:
+        """Return the derivatives 0 to 6 and the torque at even times, read-only, shape (8, m)."""
+        return (_grid if intervals > MAX_KEPT_INTERVALS else _kept_grid)(self, intervals)
+
+
+@lru_cache(maxsize=TASKS_KEPT)
+def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
+    """
+    Return what plans of an arm have in common; arms and options count as equal if identical.
+
+    Raises
+    ------
+    ArithmeticError
+        The numbers leave double precision.
+    FlatPlannerError
+        The arm, the weights or the equation allow no plan.
+
+    """
+    mapping = flat_map(arm, options.flat_model)
+    cost = strategy_cost(
+        options.strategy, mapping, r=options.r, p=options.p, custom=options.custom
+    )
+    half = 0.5 * duration
+    powers = half**_ORDERS
+    with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
+        normalised = rounded(cost.characteristic() * powers[::-1] ** 2)
+        unit = unit_motion(normalised.tobytes())
+        rates = 1.0 / powers
+        largest = float((rates * unit.peaks).max())
+    # (35) with every derivative in units of the half duration.
+    cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
+    reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5)
+    return Task(
+        cost=cost, flat_map=mapping, unit=unit, rates=rates, cost_value=cost_value, reach=reach
+    )
+
+
+def _grid(task: Task, intervals: int) -> FloatArray:
+    """Return the motion over 1 rad at even times."""
+    unit = task.unit.grid(intervals)
+    table = np.empty((len(unit) + 1, intervals + 1))
+    np.multiply(task.rates[:, None], unit, out=table[:-1])
+    np.matmul(task.rows[0], unit, out=table[-1])
+    table.setflags(write=False)
+    return table
+
+
+_kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
+
+
+@lru_cache(maxsize=GRIDS_KEPT)
+def fractions(intervals: int) -> FloatArray:
+    """Return even fractions of the duration, both ends exact."""
+    fractions = np.arange(intervals + 1.0) / intervals
+    fractions.setflags(write=False)
+    return fractions

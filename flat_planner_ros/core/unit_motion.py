@@ -1,0 +1,185 @@
+"""
+Unit motion: the certified optimal law from -1/2 to 1/2 in normalised time.
+
+From rest to rest, everything about a law but its size, place and duration follows from the six
+normalised coefficients of its equation (docs/derivation.md, (23)). Unit motions are therefore
+computed once and kept: other distances, and other arms with the same numbers, are multiples.
+"""
+
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
+from typing import NamedTuple
+
+from flat_planner_ros.core.extremal import (
+    extremal,
+    Jets,
+    momentum_of,
+    stationarity_residual,
+)
+from flat_planner_ros.core.motion_law import MotionLaw
+from flat_planner_ros.core.quadrature import half_quadrature
+from flat_planner_ros.core.solutions import CONDITIONS
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+JET_ORDER = 6
+"""Highest derivative of the planned variable that joint motions and the flat plan need."""
+
+PROBES = 8
+"""Evenly spaced times of half a motion at which a law is certified, besides those near the end."""
+
+PROBE_DEPTH = 36
+"""Halvings of the distance to the start at which a law is certified."""
+
+KEY_BITS = 48
+"""
+Leading bits of the normalised coefficients that identify a unit motion.
+
+Coefficients are computed with errors of a few units in their last, 53rd bit. What is left of them
+differs for equal numbers of two arms only where such an error crosses a multiple of 2^-48. The law
+is that of the rounded coefficients: the same whatever was planned before.
+"""
+
+KEY_ROUNDING = 2.0**-KEY_BITS
+"""Largest relative change of a coefficient by rounding; at most this adds to (32) [-]."""
+
+UNITS_KEPT = 64
+"""Unit motions in the cache; the one unused for longest makes room."""
+
+GRIDS_KEPT = 32
+"""Sampled unit motions in the cache."""
+
+MAX_KEPT_INTERVALS = 10_000
+"""Longest grid that is kept; with `GRIDS_KEPT` it bounds the cache to 18 MB."""
+
+
+class Mean(NamedTuple):
+    """Means and peaks over a motion, of linear combinations of derivatives."""
+
+    mean_square: FloatArray
+    peak: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnitMotion:
+    """
+    Optimal law of one unit of distance and its quality, all in normalised time [-].
+
+    Attributes
+    ----------
+    law
+        From -1/2 at t = 0 to 1/2 at t = 2; odd about the middle.
+    boundary_residual
+        (31) of docs/derivation.md.
+    optimality_residual
+        (32) of docs/derivation.md, at most, for coefficients before rounding.
+    momentum
+        Conserved momentum (33), here also the cost.
+    peaks
+        Largest magnitudes of the derivatives 0 to 6 at the times of the certificate.
+
+    """
+
+    law: MotionLaw
+    boundary_residual: float
+    optimality_residual: float
+    momentum: float
+    peaks: FloatArray
+
+    def jet(self, after_start: FloatArray, before_end: FloatArray) -> FloatArray:
+        """Return the derivatives 0 to 6 at x + 1 and 1 - x, shape (7, m)."""
+        return self.law.terms.at(after_start, before_end, JET_ORDER)
+
+    def grid(self, intervals: int) -> FloatArray:
+        """Return the derivatives 0 to 6 at even times, ends exact, read-only, shape (7, m)."""
+        if intervals > MAX_KEPT_INTERVALS:
+            return _grid(self, intervals)
+        return _kept_grid(self, intervals)
+
+    def mean(self, rows: FloatArray) -> Mean:
+        """
+        Return mean squares and peaks of combinations of derivatives over the motion.
+
+        Parameters
+        ----------
+        rows
+            Factors of the derivatives 0 to 6, none of the value itself, shape (m, 7).
+
+        """
+        weights, jet = self._fine
+        # Derivatives of even order are odd about the middle: the other half has their sign turned.
+        odd, even = rows[:, 2::2] @ jet[2::2], rows[:, 1::2] @ jet[1::2]
+        return Mean((odd**2 + even**2) @ weights, (np.abs(odd) + np.abs(even)).max(axis=1))
+
+    @cached_property
+    def _fine(self) -> tuple[FloatArray, FloatArray]:
+        """Return weights and derivatives at the nodes of a quadrature of the first half."""
+        times, weights = half_quadrature(self.law)
+        return weights, self.jet(times, 2.0 - times)
+
+
+def rounded(coefficients: FloatArray) -> FloatArray:
+    """Return numbers to `KEY_BITS` leading bits, by Dekker's splitting."""
+    shifted = coefficients * (2.0 ** (53 - KEY_BITS) + 1.0)
+    result: FloatArray = shifted - (shifted - coefficients)
+    return result
+
+
+@lru_cache(maxsize=UNITS_KEPT)
+def unit_motion(key: bytes) -> UnitMotion:
+    """
+    Return the unit motion of an equation.
+
+    Parameters
+    ----------
+    key
+        The bytes of the coefficients a_0 ... a_6 in normalised time.
+
+    Raises
+    ------
+    UncertifiedPlan
+        The boundary conditions are singular in double precision.
+
+    """
+    coefficients = np.frombuffer(key)
+    ends = 0.5 * np.eye(CONDITIONS)[0]
+    law = extremal(coefficients, 2.0, Jets(start=-ends, end=ends))
+    times = _probes()
+    jet = law.terms.at(times, 2.0 - times, 2 * CONDITIONS)
+    peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
+    miss = np.maximum(np.abs(jet[:CONDITIONS, 0] + ends), np.abs(jet[:CONDITIONS, -1] - ends))
+    # Relative to the start, as the value's own peak is the distance.
+    size = peaks[:CONDITIONS] + ends
+    return UnitMotion(
+        law=law,
+        boundary_residual=float((miss / size).max()),
+        optimality_residual=stationarity_residual(coefficients, jet) + KEY_ROUNDING,
+        momentum=float(momentum_of(coefficients, jet)[-2]),
+        peaks=peaks,
+    )
+
+
+@cache
+def _probes() -> FloatArray:
+    """
+    Return normalised times that crowd towards the start as fast as boundary layers can.
+
+    The law is odd: one half is enough. The last two are the middle and the end.
+    """
+    layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
+    times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
+    return np.append(times, 2.0)
+
+
+def _grid(unit: UnitMotion, intervals: int) -> FloatArray:
+    """Return a unit motion at even times, the residuals at the ends removed."""
+    table = unit.law.terms.on_even_grid(intervals, JET_ORDER)
+    table[1:CONDITIONS, 0] = table[1:CONDITIONS, -1] = 0.0
+    table[0, 0], table[0, -1] = -0.5, 0.5
+    table.setflags(write=False)
+    return table
+
+
+_kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
