@@ -65,8 +65,8 @@ def sections(options: Namespace) -> list[Section]:
 
 def answer(made: Plan) -> problem.Answer:
     """Return y to y^(6) and the torque of a plan at the 1001 times."""
-    jet = made.law.jet(problem.TIMES, problem.ORDERS - 1)
-    return problem.Answer(jet, problem.effort(jet))
+    samples = made.sample(made.request.duration / (problem.SAMPLES - 1))
+    return problem.Answer(samples.planned, samples.torque)
 
 
 def new_task() -> Task:
@@ -95,17 +95,21 @@ def _own_rows() -> list[Row]:
     far = answer(_plan(Task(problem.request(distance=2.0 * problem.DISTANCE), _KNOWN_ARM)))
     halved = problem.error(problem.Answer(0.5 * far.jet, 0.5 * far.effort))
     assert halved <= OWN_ERROR, f'the rescaled plan is wrong by {halved:.3g}'
-    period = problem.DURATION / (problem.SAMPLES - 1)
     steps = {
         'the certified law': lambda task: _plan(task),
         'and 1001 samples of y to y^(6), torque': lambda task: answer(_plan(task)),
-        'and 1001 samples of all joints and y': lambda task: _plan(task).sample(period),
+        'and 1001 samples of all joints and y': lambda task: _joints(_plan(task)),
         'and its peaks and RMS values': lambda task: _with_peaks(_plan(task)),
     }
     return [
         Row(name, timing(step, new_task), timing(step, new_distance), error)
         for name, step in steps.items()
     ]
+
+
+def _joints(made: Plan) -> object:
+    samples = made.sample(made.request.duration / (problem.SAMPLES - 1))
+    return samples.positions, samples.velocities, samples.accelerations, samples.flat
 
 
 def _with_peaks(made: Plan) -> object:
