@@ -41,7 +41,7 @@ demo: install  ## the paper's experiment on the three nodes: table, figures and 
 test: export REQUIRE_ROS := 1
 test: export ROS_PYTHON_CHECK_FIELDS := 1
 test: lint  ## ruff, mypy and all tests
-	$(BIN)/python -c '$(PYTEST)' --timeout=120 $(ARGS)
+	$(BIN)/python -c '$(PYTEST)' -n 2 --dist loadfile --timeout=120 $(ARGS)
 
 fuzz: export FUZZ_CASES ?= 100000
 fuzz: install  ## random motions against multiple precision, FUZZ_CASES=100000 by default

@@ -46,6 +46,7 @@ setup(
             'mypy>=2.4,<2.5',
             'pytest>=7.4,<10',
             'pytest-timeout>=2.2,<3',
+            'pytest-xdist>=3.5,<4',
             'pyyaml>=6,<7',
             'ruff>=0.17,<0.18',
         ],

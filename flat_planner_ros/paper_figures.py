@@ -3,10 +3,14 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from flat_planner_ros.paper_example import DURATION, Result, SCENARIOS
+from flat_planner_ros.paper_example import DURATION, Recording, Result, SCENARIOS
+import numpy as np
 
 SHOWN_AFTER = 1.0
 """Time that is drawn after the end of the motion [s]."""
+
+LONGEST_STEP = 0.03
+"""Time between two joint states that a line bridges [s]."""
 
 TICKS = 0.5
 """Spacing of the marks on the time axis [s]."""
@@ -52,7 +56,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
             if result.scenario != scenario:
                 continue
             colour, line = STYLES[result.strategy]
-            times, positions, efforts = result.recording
+            times, positions, efforts = _with_gaps(result.recording)
             for row, values in enumerate((positions[:, 0], positions[:, 1], efforts)):
                 axes[row, column].plot(times, values, line, color=colour, label=result.strategy)
         for row, label in enumerate(ROWS):
@@ -69,3 +73,9 @@ def draw(results: Sequence[Result], path: Path) -> None:
     figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
     figure.savefig(path, dpi=120)
     plt.close(figure)
+
+
+def _with_gaps(recording: Recording) -> Recording:
+    """Return a recording whose lines break where joint states were lost."""
+    holes = np.flatnonzero(np.diff(recording.times) > LONGEST_STEP) + 1
+    return Recording(*(np.insert(values, holes, np.nan, axis=0) for values in recording))

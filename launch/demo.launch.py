@@ -4,7 +4,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = 'flat_planner_ros'
@@ -38,7 +38,8 @@ def generate_launch_description() -> LaunchDescription:
                     name=name,
                     namespace=LaunchConfiguration('namespace'),
                     parameters=[
-                        LaunchConfiguration('params_file'),
+                        # Substitution makes launch read the file, and so miss a missing one.
+                        ParameterFile(LaunchConfiguration('params_file'), allow_substs=True),
                         {'use_sim_time': use_sim_time},
                     ],
                     ros_arguments=['--log-level', LaunchConfiguration('log_level')],

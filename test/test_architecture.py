@@ -256,7 +256,7 @@ def test_test_dependencies_agree():
         for name in distributions(setup_arguments()['extras_require']['test'])
     }
     declared = {name.removeprefix('python3-') for name in manifest('test_depend')}
-    only_pip = {'mpmath', 'mypy', 'pytest-timeout', 'ruff'}
+    only_pip = {'mpmath', 'mypy', 'pytest-timeout', 'pytest-xdist', 'ruff'}
     assert declared | only_pip == extra
 
 

@@ -282,6 +282,14 @@ def _checked_duration(goal: Goal) -> float | None:
         return None
     previous = 0.0
     for index, time in enumerate(times):
+        if time == 0.0:
+            raise RequestRejected(
+                Reason.TIME_NOT_INCREASING,
+                f'time_from_start is zero in point {index}, but not in all points',
+                value=time,
+                limit=previous,
+                time=time,
+            )
         if not time > previous:
             raise RequestRejected(
                 Reason.TIME_NOT_INCREASING,

@@ -1,7 +1,7 @@
 """Session of a planner: goals and measurements in, motions out, in the order of time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import inf
 
@@ -158,6 +158,7 @@ class PlannerSession:
         self._measured: JointSample | None = None
         self._motion: Motion | None = None
         self._running = False
+        self._is_prompt = False
         self._count = 0
         self._last_goal: Goal | None = None
 
@@ -234,8 +235,22 @@ class PlannerSession:
             plan_id=self._count, plan=planned, samples=samples, start=start_time, planned_at=now
         )
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
+        self._is_prompt = goal.stamp is None
         self._running = settings.execute
         return self._motion
+
+    def launched(self, now: float) -> Motion:
+        """
+        Return the motion accepted last, ready to be sent.
+
+        Planning takes time: a motion that starts as soon as possible starts start_delay from now.
+        """
+        motion = self._motion
+        if motion is None:
+            raise RequestRejected(Reason.EMPTY_GOAL, 'no goal has been accepted yet')
+        if self._is_prompt:
+            self._motion = motion = replace(motion, start=now + self.settings.start_delay)
+        return motion
 
     def finished(self, now: float) -> Motion | None:
         """Return the running motion once, at the first call after its end."""

@@ -98,8 +98,8 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
         'error_code': ERROR_CODES[error.reason],
         'error_name': error.reason.value,
         'joint': error.joint,
-        'value': error.value,
-        'limit': error.limit,
+        'value': _precise(error.value),
+        'limit': _precise(error.limit),
         'time': error.time,
         **({} if goal is None else _echo(goal)),
     }
@@ -270,6 +270,11 @@ def _list(entries: Sequence[float | str]) -> str:
     shown = [_text(entry)[:ECHO_CHARACTERS] for entry in entries[:ECHO_LENGTH]]
     more = ', ...' if len(entries) > ECHO_LENGTH else ''
     return f'[{", ".join(shown)}{more}]'
+
+
+def _precise(value: float | None) -> str | None:
+    """Return a number that may be a time since 1970."""
+    return None if value is None else f'{value:.13g}'
 
 
 def _text(value: float | int | str) -> str:

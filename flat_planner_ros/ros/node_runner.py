@@ -1,5 +1,6 @@
 """The life of a process of nodes: start, spin, and a clear end."""
 
+from argparse import ArgumentParser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import os
@@ -13,9 +14,17 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 EXECUTOR = 'FLAT_PLANNER_EXECUTOR'
 """Environment variable: `events`, the default where ROS has it, or `single`."""
+
+HINTS = {
+    'Sequence should be of same type': ' (write every number of a list as 1.0, not 1)',
+    'Sequences can only be values': ' (every block of a parameter file needs ros__parameters:)',
+    'Error opening YAML file': ' (no such file)',
+}
+"""What to write instead, by a part of what rcl says of a parameter file."""
 
 SPIN_PERIOD = 0.1
 """Longest wait in the executor [s]; without one an EventsExecutor would never run a callback."""
@@ -44,13 +53,16 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
         try:
             # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
             try:
+                _refuse_strays(sys.argv if args is None else args)
                 rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
                 executor = _new_executor()
                 for create in creators:
                     nodes.append(create())
                     executor.add_node(nodes[-1])
             except (FlatPlannerError, ParameterException, RuntimeError) as error:
-                print(f'cannot start: {" ".join(str(error).split())}', file=sys.stderr)
+                text = ' '.join(str(error).split())
+                hint = next((hint for part, hint in HINTS.items() if part in text), '')
+                print(f'cannot start: {text}{hint}', file=sys.stderr)
                 return 1
             while rclpy.ok() and not interrupted.is_set():
                 executor.spin_once(timeout_sec=SPIN_PERIOD)
@@ -63,30 +75,33 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
     return 0
 
 
+def _refuse_strays(args: Sequence[str]) -> None:
+    """Explain the command line, and end with exit code 2, if there is more than ROS arguments."""
+    parser = ArgumentParser(
+        usage='%(prog)s [-h] [--ros-args ...]',
+        description='A node of flat_planner_ros; it runs until Ctrl-C.',
+        epilog='ROS arguments follow --ros-args, e.g. --ros-args --params-file arm.yaml',
+    )
+    parser.parse_args(remove_ros_args(list(args))[1:])
+
+
 @contextmanager
 def _signals_caught() -> Iterator[Event]:
     """
-    Turn the first SIGINT or SIGTERM into an event; a second one acts as ever.
+    Turn SIGINT and SIGTERM into an event, as often as they come.
 
     Left to ROS, a signal would end the context in the middle of a callback, which then fails.
     """
     interrupted = Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-    def interrupt(*_: object) -> None:
-        interrupted.set()
-        restore()
-
     for number in before:
-        signal.signal(number, interrupt)
+        signal.signal(number, lambda *_: interrupted.set())
     try:
         yield interrupted
     finally:
-        restore()
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _new_executor() -> Executor:

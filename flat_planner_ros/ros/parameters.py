@@ -19,7 +19,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -333,6 +333,9 @@ def _declare(node: Node, row: Row, default: Any) -> None:
     """Declare one parameter and put the middleware's complaint about its type into words."""
     try:
         node.declare_parameter(row.name, default, row.descriptor())
+    except InvalidParameterValueException as error:
+        value = node._parameter_overrides[row.name].value
+        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value}') from error
     except InvalidParameterTypeException as error:
         expected = row.default
         if not isinstance(expected, Parameter.Type):

@@ -157,7 +157,7 @@ class PlannerNode(Node):
         goal, started = None, perf_counter()
         try:
             goal = read()
-            motion = self._session.submit(goal, self._now())
+            self._session.submit(goal, self._now())
         except RequestRejected as error:
             status = diagnostics.rejected_status(error, goal)
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
@@ -166,6 +166,7 @@ class PlannerNode(Node):
             status = diagnostics.rejected_status(rejection, goal)
         else:
             elapsed = perf_counter() - started
+            motion = self._session.launched(self._now())
             # The verdict's peaks take a while: the plant need not wait for them.
             self._publish_motion(motion)
             status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)

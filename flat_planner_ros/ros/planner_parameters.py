@@ -84,7 +84,7 @@ ROWS = [
         description='duration of goals without times [s]; 0 = automatic, not yet available',
         lower=0.0,
     ),
-    Row(name='duration.min', default=0.01, description='shortest duration [s]', lower=0.0),
+    Row(name='duration.min', default=0.05, description='shortest duration [s]', lower=0.0),
     Row(name='duration.max', default=600.0, description='longest duration [s]', lower=0.0),
     Row(
         name='limits.position_min',

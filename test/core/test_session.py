@@ -50,6 +50,15 @@ def test_a_motion_goes_from_the_measured_start_to_the_goal():
     assert motion.plan_id == 1
 
 
+def test_planning_time_does_not_eat_the_start_delay():
+    planner = session()
+    planner.submit(GOAL, NOW)
+    assert planner.launched(NOW + 2.0).start == NOW + 2.0 + SETTINGS.start_delay
+    planner = session()
+    planner.submit(replace(GOAL, stamp=NOW + 7.0), NOW)
+    assert planner.launched(NOW + 2.0).start == NOW + 7.0
+
+
 def test_a_small_measured_deflection_does_not_enter_the_plan():
     planner = session()
     planner.measure(sample(position=(0.5, 0.008)))

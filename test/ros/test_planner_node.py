@@ -436,7 +436,10 @@ BAD_ARGUMENTS = {
     'three joints': (['-p', 'joints:=[a, b, c]'], 'only 2'),
     'unknown choice': (['-p', 'strategy:=best'], 'one of polynomial'),
     'not available': (['-p', 'stream_effort:=true'], 'not available'),
-    'range': (['-p', 'sampling.period:=1.0'], 'sampling.period'),
+    'range': (
+        ['-p', 'sampling.period:=1.0'],
+        'sampling.period must be in [0.0005, 0.01], got 1.0',
+    ),
 }
 
 
@@ -458,6 +461,23 @@ def test_a_broken_parameter_file_ends_the_node_with_exit_code_1(graph, tmp_path)
     assert process.wait() == 1
     assert 'cannot start' in process.stderr.strip().splitlines()[-1]
     assert 'Traceback' not in process.stderr
+
+
+def test_arguments_that_are_not_for_ros_are_explained(graph):
+    process = graph.start('planner_node', '--params-file', 'arm.yaml')
+    assert process.wait() == 2
+    assert '--ros-args' in process.stdout + process.stderr
+    process = graph.start('planner_node', '--help')
+    assert process.wait() == 0
+    assert '--ros-args --params-file' in process.stdout
+
+
+def test_an_integer_in_a_list_is_explained(graph, tmp_path):
+    file = tmp_path / 'integer.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    model:\n      inertia_star: [1, 0.5]\n')
+    process = graph.start('planner_node', '--ros-args', '--params-file', str(file))
+    assert process.wait() == 1
+    assert 'write every number of a list as 1.0' in process.stderr
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
