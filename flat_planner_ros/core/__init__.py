@@ -20,9 +20,9 @@ from flat_planner_ros.core.errors import (
 )
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.goal import (
+    check_point_count,
     Goal,
     GoalPoint,
-    MAX_POINTS,
     Reason,
     RequestRejected,
     rest_target,
@@ -44,6 +44,7 @@ __all__ = [
     'Adoption',
     'AdoptionRefused',
     'ArmState',
+    'check_point_count',
     'EffortProfile',
     'fit_oscillation',
     'flat_map',
@@ -59,7 +60,6 @@ __all__ = [
     'InvalidRequest',
     'JointSample',
     'Level',
-    'MAX_POINTS',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',

@@ -197,18 +197,23 @@ def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
     return RestTarget(tuple(angles[name] for name in joints), duration)
 
 
+def check_point_count(count: int) -> None:
+    """Refuse more points than any goal may have."""
+    if count > MAX_POINTS:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal has {count} points, more than {MAX_POINTS}',
+            value=float(count),
+            limit=float(MAX_POINTS),
+        )
+
+
 def _check_joints(goal: Goal, joints: Sequence[str]) -> None:
     """Refuse an empty goal and names that are not each actuated joint once."""
     if not goal.joint_names or not goal.points:
         missing = 'joint names' if not goal.joint_names else 'points'
         raise RequestRejected(Reason.EMPTY_GOAL, f'the goal has no {missing}')
-    if len(goal.points) > MAX_POINTS:
-        raise RequestRejected(
-            Reason.INVALID_GOAL,
-            f'the goal has {len(goal.points)} points, more than {MAX_POINTS}',
-            value=float(len(goal.points)),
-            limit=float(MAX_POINTS),
-        )
+    check_point_count(len(goal.points))
     known = ', '.join(joints)
     for name, count in Counter(goal.joint_names).items():
         if name not in joints:

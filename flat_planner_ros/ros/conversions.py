@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.core import (
     ArmState,
+    check_point_count,
     EffortProfile,
     Goal,
     GoalPoint,
     InvalidCommand,
     InvalidRequest,
     JointSample,
-    MAX_POINTS,
     Motion,
     PlannedMotion,
     PlanSamples,
-    Reason,
-    RequestRejected,
     Residual,
     select,
 )
@@ -58,13 +56,7 @@ def goal_from_trajectory(msg: JointTrajectory) -> Goal:
         More points than any goal may have; they are not even copied.
 
     """
-    if len(msg.points) > MAX_POINTS:
-        raise RequestRejected(
-            Reason.INVALID_GOAL,
-            f'the goal has {len(msg.points)} points, more than {MAX_POINTS}',
-            value=float(len(msg.points)),
-            limit=float(MAX_POINTS),
-        )
+    check_point_count(len(msg.points))
     points = tuple(
         GoalPoint(
             time=seconds(point.time_from_start),
