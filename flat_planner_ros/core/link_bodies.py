@@ -1,4 +1,4 @@
-"""Rigid bodies of an arm's links, as simulators and visualisation want them (docs/derivation.md, R)."""
+"""Rigid bodies of an arm's links, as simulators want them (docs/derivation.md, R)."""
 
 from math import sqrt
 from typing import NamedTuple

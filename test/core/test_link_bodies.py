@@ -3,7 +3,8 @@
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidModel
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, DRAWN_LENGTH
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 
@@ -90,7 +91,7 @@ def test_the_reduced_form_of_three_joints_is_realised(first, tip, last, ratio, d
 )
 def test_the_full_form_is_realised_balanced_or_not(links, weights, arms, angle):
     names = ('link_length', 'link_com', 'link_mass', 'link_inertia')
-    model = {name: list(column) for name, column in zip(names, zip(*links, strict=True))}
+    model = dict(zip(names, map(list, zip(*links, strict=True)), strict=True))
     model |= {'counterbalance_mass': weights, 'counterbalance_arm': arms}
     bodies = bodies_of_links(**model)
     arm = PlanarArm.from_links(**model, gravity=GRAVITY, **SPRING)

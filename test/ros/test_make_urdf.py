@@ -1,4 +1,4 @@
-"""The program make_urdf: from a parameter file to a URDF, with the planner's rules for the file."""
+"""The program make_urdf: a parameter file, read as the planner reads it, to a URDF."""
 
 from pathlib import Path
 import subprocess
@@ -55,7 +55,8 @@ def test_limits_of_the_planner_become_limits_of_the_joints(tmp_path):
         '    joints: [a, b]\n'
         '    model: {inertia_star: [6.4e-4, 3.3e-5], stiffness: 3.0e-3, damping: 2.0e-5}\n'
         '/left/flat_planner:\n  ros__parameters:\n'
-        '    limits: {position_min: [-1.0, -.inf], position_max: [2.0, .inf], effort: [0.5, .inf]}\n'
+        '    limits:\n      position_min: [-1.0, -.inf]\n      position_max: [2.0, .inf]\n'
+        '      effort: [0.5, .inf]\n'
     )
     root = ElementTree.fromstring(read_urdf(file, namespace='left').encode())
     first = root.find('joint[@name="a"]')
