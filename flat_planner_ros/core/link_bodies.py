@@ -116,7 +116,7 @@ def bodies_of_constants(
     half = sqrt(3.0 * last / bar_mass) if bar_mass else length
     bar = LinkBody(length=half, tail=half, mass=bar_mass, com=0.0, inertia=last)
     rows = zip(*(array.tolist() for array in links), strict=True)
-    return (*(_balanced(*row, 0.0, 0.0) for row in rows), elbow, bar)
+    return (*(_balanced(*row) for row in rows), elbow, bar)
 
 
 def _elbow(own: float, length: float, tip: float, share: float) -> LinkBody:
@@ -130,7 +130,12 @@ def _elbow(own: float, length: float, tip: float, share: float) -> LinkBody:
 
 
 def _balanced(
-    length: float, com: float, mass: float, inertia: float, weight: float, arm: float
+    length: float,
+    com: float,
+    mass: float,
+    inertia: float,
+    weight: float = 0.0,
+    arm: float = 0.0,
 ) -> LinkBody:
     """Return a link and its counterbalance as one body, (R1)."""
     total = mass + weight
