@@ -28,6 +28,7 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
@@ -52,6 +53,8 @@ __all__ = [
     'Adoption',
     'AdoptionRefused',
     'ArmState',
+    'bodies_of_constants',
+    'bodies_of_links',
     'check_point_count',
     'EffortProfile',
     'fit_oscillation',
@@ -69,6 +72,7 @@ __all__ = [
     'JointSample',
     'Law',
     'Level',
+    'LinkBody',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
