@@ -48,14 +48,20 @@ MAY_IMPORT = {
     'extremal': 'solutions motion_law modes roots errors',
     'quadrature': 'motion_law modes errors',
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
+    'robustness': 'arm errors',
+    'insensitivity': 'robustness arm errors',
+    'momentum': 'flatness arm errors',
+    'insensitive': 'insensitivity momentum robustness flatness arm errors',
+    'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
     'session': 'planning goal motion_record cost flatness arm errors',
-    'request': 'solutions cost flatness errors',
+    'request': 'insensitivity solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
     'moving_start': 'task unit_motion extremal solutions motion_law',
-    'planning': 'moving_start course task request plan_samples cost flatness arm errors',
+    'planning': 'shaped_course moving_start course task request plan_samples cost flatness arm '
+    'errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

@@ -8,13 +8,13 @@ points of its boundary (docs/derivation.md, section 9).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from math import ceil, log10, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest
+from flat_planner_ros.core.errors import OutOfReach
 from flat_planner_ros.core.flatness import apply_row, flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.insensitivity import (
     Criterion,
@@ -58,6 +58,9 @@ MARGIN = 5e-3
 REFRESHED = 0.05
 """Share of all weights that is spread evenly again between two steps of a search [-]."""
 
+MAX_POINTS = 65
+"""Most points of an edge that are weighed; those of the prediction may be more."""
+
 MEAN_NODES = 4
 """Gauss-Legendre nodes over either side of the box, plus one per radian of turn."""
 
@@ -84,8 +87,6 @@ class ShapedMotion:
         The weight that was used, or that follows from a prescribed bound [-].
     effort
         RMS effort over the least one of any motion [-].
-    nominal, worst
-        Residual amplitude on the nominal arm and the largest on the edges of the box [rad].
     cost
         effort^2 + (weight * residual / rad)^2, the residual taken by the criterion [-].
     gap
@@ -100,8 +101,6 @@ class ShapedMotion:
     law: SeriesLaw
     weight: float
     effort: float
-    nominal: float
-    worst: float
     cost: float
     gap: float
     boundary_residual: float
@@ -132,8 +131,10 @@ def shaped_motion(
 
     Raises
     ------
+    OutOfReach
+        No motion meets the prescribed bound.
     InvalidRequest
-        A prescribed bound is out of reach, or an arm in the box does not oscillate.
+        An arm in the box does not oscillate.
     NotFlat
         The arm is not flat.
 
@@ -147,26 +148,32 @@ def _solved(
     arm: PlanarArm, duration: float, wanted: Insensitivity, distance: float
 ) -> ShapedMotion:
     """Return the motion; arms count as equal if identical."""
-    problem = _problem(arm, duration, wanted)
+    problem = _Problem.of(arm, duration, wanted)
     if wanted.max_residual > 0.0:
         limit = (1.0 - MARGIN) * wanted.max_residual / distance
         found = _search(problem, lambda c: problem.worst(c) / limit, rises=False)
         if (reached := distance * problem.worst(found.c)) > wanted.max_residual:
-            raise InvalidRequest(
-                f'no motion of {duration:g} s is found with a residual of at most '
-                f'{wanted.max_residual:g} rad over the box; the smallest is {reached:.3g} rad, '
-                f'with {found.effort * least_effort(arm, distance, duration):.3g} N m RMS: use a '
-                f'longer duration, insensitivity.nominal free, or more modes'
+            raise OutOfReach(
+                'residual',
+                reached,
+                wanted.max_residual,
+                f'no motion of {duration:g} s is found that leaves at most '
+                f'{wanted.max_residual:g} rad over the box; the least is {reached:.3g} rad, with '
+                f'{found.effort * least_effort(arm, distance, duration):.3g} N m RMS: use a '
+                f'longer duration, insensitivity.nominal free, or more modes',
             )
     elif wanted.max_effort_rms > 0.0:
         least = least_effort(arm, distance, duration)
         limit = (1.0 - MARGIN) * wanted.max_effort_rms / least
         found = _search(problem, lambda c: problem.effort(c) / limit, rises=True)
         if (taken := found.effort * least) > wanted.max_effort_rms:
-            raise InvalidRequest(
-                f'no motion of {duration:g} s over {distance:.4g} rad is found with '
+            raise OutOfReach(
+                'effort',
+                taken,
+                wanted.max_effort_rms,
+                f'no motion of {duration:g} s over {distance:.4g} rad is found with at most '
                 f'{wanted.max_effort_rms:g} N m RMS; the least is {taken:.4g} N m: use a longer '
-                f'duration'
+                f'duration',
             )
     else:
         found = problem.solve(wanted.weight or DEFAULT_WEIGHT)
@@ -192,67 +199,111 @@ class _Problem:
 
     Attributes
     ----------
-    basis, mapping, duration
+    arm, duration, wanted
+        What is asked for.
+    basis
         From coefficients to the law.
     origin, directions
         Coefficients of the basis: origin + directions @ c.
-    matrix, start
-        Real and imaginary parts of the residuals at the weighed points, matrix @ c + start,
-        shapes (2 p, m) and (2 p,) [-].
-    shares
-        Weights of these points to begin with, of sum 1, shape (p,) [-].
-    least
-        Effort squared of c = 0, in units of the basis.
-    is_exact, is_minimax
-        What may be left on the nominal arm, and how residuals are weighed.
-    edges
-        Points on the edges of the box.
-    edge_matrix, edge_start
-        Residuals there, complex, the last one that of the nominal arm.
 
     """
 
-    basis: MomentumBasis
-    mapping: FlatMap
+    arm: PlanarArm
     duration: float
+    wanted: Insensitivity
+    basis: MomentumBasis
     origin: FloatArray
     directions: FloatArray
-    matrix: FloatArray
-    start: FloatArray
-    shares: FloatArray
-    least: float
-    is_exact: bool
-    is_minimax: bool
-    edges: list[FloatArray]
-    edge_matrix: ComplexArray
-    edge_start: ComplexArray
+
+    @classmethod
+    def of(cls, arm: PlanarArm, duration: float, wanted: Insensitivity) -> '_Problem':
+        """Return the problem, what is left on the nominal arm settled."""
+        modes = wanted.modes
+        problem = cls(
+            arm=arm,
+            duration=duration,
+            wanted=wanted,
+            basis=momentum_basis(modes),
+            origin=np.zeros(modes),
+            directions=np.eye(modes),
+        )
+        if wanted.nominal is Nominal.FREE:
+            return problem
+        matrix, start = problem.residuals(np.ones((1, 2)))
+        left, sizes, right = np.linalg.svd(matrix)
+        origin = right[:2].T @ (-(left.T @ start) / sizes)
+        return replace(problem, origin=origin, directions=right[2:].T)
+
+    @cached_property
+    def least(self) -> float:
+        """Return the effort squared of c = 0, in units of the basis."""
+        return self.basis.least + float(self.origin @ self.origin)
+
+    @cached_property
+    def points(self) -> tuple[FloatArray, FloatArray]:
+        """Return the arms that are weighed, (p, 2), and shares of weight to begin with, (p,)."""
+        box, oscillator = self.wanted.box, Oscillator.of(self.arm)
+        if self.wanted.criterion is Criterion.MEAN:
+            return _box_nodes(box, oscillator, self.duration)
+        edges = np.concatenate(box.edges(oscillator, self.duration, MAX_POINTS))
+        return edges, np.full(len(edges), 1.0 / len(edges))
+
+    def residuals(self, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """
+        Return residuals per rad as matrix @ c + start, real parts above imaginary ones.
+
+        Parameters
+        ----------
+        factors
+            Arms, as factors on stiffness and damping, shape (p, 2) [-].
+
+        Returns
+        -------
+        tuple[FloatArray, FloatArray]
+            Shapes (2 p, m) and (2 p,) [-].
+
+        """
+        basis, oscillator = self.basis, Oscillator.of(self.arm)
+        rows = _residual_rows(oscillator, factors, self.duration, len(basis.torque_start))
+        stacked = np.concatenate([rows.real, rows.imag])
+        changes = stacked @ basis.torque_directions
+        return changes @ self.directions, stacked @ basis.torque_start + changes @ self.origin
 
     def effort(self, c: FloatArray) -> float:
         """Return the RMS effort over the least one of any motion."""
         return sqrt((self.least + float(c @ c)) / LEAST_OF_ALL)
 
     def worst(self, c: FloatArray) -> float:
-        """Return the largest residual on the edges of the box."""
-        return largest(self.edges, self.edge_residuals(c)[:-1])[0]
+        """Return the largest residual on the edges of the box, per rad."""
+        edges, (matrix, start) = self._edges
+        amplitudes = np.hypot(*np.split(matrix @ c + start, 2))
+        return largest(edges, amplitudes)[0]
 
-    def edge_residuals(self, c: FloatArray) -> FloatArray:
-        """Return the residuals on the edges, and that of the nominal arm."""
-        residuals: FloatArray = np.abs(self.edge_matrix @ c + self.edge_start)
-        return residuals
+    @cached_property
+    def _edges(self) -> tuple[list[FloatArray], tuple[FloatArray, FloatArray]]:
+        """Return the edges of the box and the residuals on them."""
+        edges = self.wanted.box.edges(Oscillator.of(self.arm), self.duration)
+        return edges, self.residuals(np.concatenate(edges))
+
+    @cached_property
+    def _weighed(self) -> tuple[FloatArray, FloatArray]:
+        """Return the residuals of the arms that are weighed."""
+        return self.residuals(self.points[0])
 
     def solve(self, weight: float, shares: FloatArray | None = None) -> _Compromise:
         """Return the best coefficients for a weight; the shares are a first guess."""
         total = LEAST_OF_ALL * weight**2
-        shares = self.shares if shares is None else shares
-        points, identity = len(shares), np.eye(self.matrix.shape[1])
+        shares = self.points[1] if shares is None else shares
+        (matrix, start), points = self._weighed, len(shares)
+        is_minimax, identity = self.is_minimax, np.eye(matrix.shape[1])
         for _ in range(MAX_ROUNDS):
-            weighted = self.matrix.T * np.tile(total * shares, 2)
-            hessian, gradient = identity + weighted @ self.matrix, weighted @ self.start
-            c = -np.linalg.solve(hessian, gradient)
-            residuals = self.matrix @ c + self.start
+            weighted = matrix.T * np.tile(total * shares, 2)
+            hessian, gradient = identity + weighted @ matrix, weighted @ start
+            c: FloatArray = -np.linalg.solve(hessian, gradient)
+            residuals = matrix @ c + start
             squares = residuals[:points] ** 2 + residuals[points:] ** 2
             mean = float(shares @ squares)
-            weighed = float(squares.max()) if self.is_minimax else mean
+            weighed = float(squares.max()) if is_minimax else mean
             cost = self.least + float(c @ c) + total * weighed
             # For any shares, the weighted sum is a lower bound on the minimax cost.
             gap = total * (weighed - mean) / cost
@@ -266,65 +317,28 @@ class _Problem:
             c, weight, shares, self.effort(c), cost / LEAST_OF_ALL, gap, float(miss)
         )
 
+    @property
+    def is_minimax(self) -> bool:
+        """Tell whether the largest residual is weighed."""
+        return self.wanted.criterion is Criterion.WORST
+
     def motion(self, found: _Compromise) -> ShapedMotion:
-        """Return the certified law of a solution."""
+        """Return the law of a solution, with its certificate."""
         basis, coefficients = self.basis, self.origin + self.directions @ found.c
         torque = basis.torque_start + basis.torque_directions @ coefficients
         fourth = basis.start + basis.directions @ coefficients
-        law = answer(fourth, torque, self.mapping, self.duration)
-        residuals = self.edge_residuals(found.c)
+        mapping = flat_map(self.arm, FlatModel.EXACT)
+        law = answer(fourth, torque, mapping, self.duration)
+        is_exact = self.wanted.nominal is Nominal.EXACT
         return ShapedMotion(
             law=law,
             weight=found.weight,
             effort=found.effort,
-            nominal=float(residuals[-1]),
-            worst=largest(self.edges, residuals[:-1])[0],
             cost=found.cost,
             gap=found.gap,
-            boundary_residual=_miss(law, torque, self.mapping, self.is_exact),
+            boundary_residual=_miss(law, torque, mapping, is_exact),
             stationarity=found.stationarity,
         )
-
-
-def _problem(arm: PlanarArm, duration: float, wanted: Insensitivity) -> _Problem:
-    """Return the problem of an arm and a duration."""
-    basis, oscillator = momentum_basis(wanted.modes), Oscillator.of(arm)
-    edges = wanted.box.edges(oscillator, duration)
-    is_minimax = wanted.criterion is Criterion.WORST
-    factors = np.concatenate([*edges, np.ones((1, 2))])
-    shares = np.full(len(factors) - 1, 1.0 / (len(factors) - 1))
-    if not is_minimax:
-        inside, shares = _box_nodes(wanted.box, oscillator, duration)
-        factors = np.concatenate([factors, inside])
-    moments = _residual_rows(oscillator, factors, duration, len(basis.torque_start))
-    matrix, start = moments @ basis.torque_directions, moments @ basis.torque_start
-    nominal = sum(map(len, edges))
-    origin, directions = np.zeros(wanted.modes), np.eye(wanted.modes)
-    is_exact = wanted.nominal is Nominal.EXACT
-    if is_exact:
-        rows = np.array([matrix[nominal].real, matrix[nominal].imag])
-        wish = -np.array([start[nominal].real, start[nominal].imag])
-        left, sizes, right = np.linalg.svd(rows)
-        origin = right[:2].T @ ((left.T @ wish) / sizes)
-        directions = right[2:].T
-        matrix, start = matrix @ directions, start + matrix @ origin
-    weighed = slice(0, nominal) if is_minimax else slice(nominal + 1, None)
-    return _Problem(
-        basis=basis,
-        mapping=flat_map(arm, FlatModel.EXACT),
-        duration=duration,
-        origin=origin,
-        directions=directions,
-        matrix=np.concatenate([matrix[weighed].real, matrix[weighed].imag]),
-        start=np.concatenate([start[weighed].real, start[weighed].imag]),
-        shares=shares,
-        least=basis.least + float(origin @ origin),
-        is_exact=is_exact,
-        is_minimax=is_minimax,
-        edges=edges,
-        edge_matrix=matrix[: nominal + 1],
-        edge_start=start[: nominal + 1],
-    )
 
 
 def _residual_rows(
@@ -391,7 +405,7 @@ def _search(
         shares = None
         if known and problem.is_minimax:
             near = known[min(known, key=lambda other: abs(other - exponent))]
-            shares = (1.0 - REFRESHED) * near.shares + REFRESHED * problem.shares
+            shares = (1.0 - REFRESHED) * near.shares + REFRESHED * problem.points[1]
         known[exponent] = problem.solve(10.0**exponent, shares)
         return log10(share(known[exponent].c))
 
@@ -403,8 +417,11 @@ def _search(
     if miss(other) <= 0.0:
         return known[other]
     exponent = brentq(miss, low, high, xtol=SEARCH_TOLERANCE)
-    if exponent not in known:
-        miss(exponent)
+    step = SEARCH_TOLERANCE if safe == high else -SEARCH_TOLERANCE
+    # The root may be a little on the wrong side, and the share not quite smooth.
+    while miss(exponent) > 0.0 and low < exponent < high:
+        exponent += step
+        step *= 2.0
     return known[exponent]
 
 

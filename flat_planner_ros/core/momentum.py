@@ -7,7 +7,7 @@ therefore a sigma, expanded here in Legendre polynomials, and the planned variab
 like an oscillator: w + delta w' + w'' / omega^2 = sigma.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
 
@@ -153,6 +153,10 @@ class SeriesLaw:
     factor: float = 1.0
     offset: float = 0.0
 
+    def over(self, distance: float, middle: float) -> 'SeriesLaw':
+        """Return the law over another distance about another place [rad]."""
+        return replace(self, factor=distance, offset=middle)
+
     def jet(self, t: ArrayLike, order: int, /) -> FloatArray:
         """
         Return the value and its derivatives up to an order.
@@ -247,7 +251,7 @@ def _split(torque: FloatArray, delta: float, epsilon: float, duration: float) ->
     slope = np.zeros((size, size))
     for k in range(1, size):
         slope[:k, k] = legendre.legder(np.eye(size)[k])[:k]
-    table = np.linalg.solve(np.eye(size) + delta * slope + epsilon * slope @ slope, sigma.T).T
+    table: FloatArray = np.linalg.solve(np.eye(size) + delta * slope + epsilon * slope @ slope, sigma.T).T
     table.setflags(write=False)
     rate = (-delta + 1j * np.sqrt(4.0 * epsilon - delta**2)) / (2.0 * epsilon)
     # The fourth derivative of w starts at rest: there the particular solution is smallest.

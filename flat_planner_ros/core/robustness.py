@@ -63,7 +63,9 @@ class UncertaintyBox:
                     f'half-width of the {name} is {width:g}, outside [0, {MAX_HALF_WIDTH:g}]'
                 )
 
-    def edges(self, mode: 'Oscillator', duration: float) -> list[FloatArray]:
+    def edges(
+        self, mode: 'Oscillator', duration: float, most: int = MAX_POINTS
+    ) -> list[FloatArray]:
         """
         Return factors on stiffness and damping along the four edges.
 
@@ -73,6 +75,8 @@ class UncertaintyBox:
             The nominal arm.
         duration
             Time over which different arms drift apart [s].
+        most
+            Largest number of points of an edge.
 
         Returns
         -------
@@ -90,7 +94,7 @@ class UncertaintyBox:
                 continue
             ends = mode.poles(np.array([begin, end]))
             turn = duration * abs(ends[1] - ends[0])
-            count = min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), MAX_POINTS)
+            count = min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most)
             # Chebyshev points: extremes near corners are seen as well as those inside.
             share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
             edges.append(begin + share[:, None] * (end - begin))
@@ -183,21 +187,28 @@ class PredictedResidual:
 
 
 def residual_amplitude(
-    oscillator: Oscillator, effort: FloatArray, duration: float, poles: ComplexArray
+    oscillator: Oscillator,
+    effort: FloatArray,
+    duration: float,
+    poles: ComplexArray,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> FloatArray:
     """
-    Return what an effort leaves behind that is played with linear interpolation from rest.
+    Return what an effort leaves behind that is played with linear interpolation.
 
     Parameters
     ----------
     oscillator
         The arm; only its inertia enters, as the poles bring the rest.
     effort
-        Effort of joint n-1 at even times, both ends included, friction left out, shape (m,) [N m].
+        Effort of joint n-1 at even times, both ends included, zero at the last, friction left
+        out, shape (m,) [N m].
     duration
         From the first to the last [s].
     poles
         Those of the arms that play it, shape (p,) [1/s].
+    start
+        Angle and velocity of the passive joint at the start [rad], [rad/s].
 
     Returns
     -------
@@ -210,27 +221,35 @@ def residual_amplitude(
 
     """
     step = duration / (len(effort) - 1)
-    # The ends have half a hat each; at rest the effort is zero there and nothing is missed.
-    reversed_effort = effort[::-1]
     rows = -(-len(effort) // BLOCK)
     padded = np.zeros(rows * BLOCK)
-    padded[: len(effort)] = reversed_effort
+    padded[: len(effort)] = effort[::-1]
     turn = step * poles
     fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
     coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
     total = np.einsum('rp,rp->p', padded.reshape(rows, BLOCK) @ fine, coarse)
     hat = (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2
-    amplitudes: FloatArray = (
-        step * np.abs(hat * total) / (oscillator.free_inertia * np.abs(poles.imag))
-    )
+    driven = -step / oscillator.free_inertia * hat * total
+    angle, velocity = start
+    if angle or velocity or effort[0]:
+        # In motion: the first sample has half a hat, and the joint brings its own oscillation.
+        half_hat = (np.expm1(-turn) + turn) / turn**2
+        missing = (hat - half_hat) * effort[0] * step / oscillator.free_inertia
+        free = velocity - poles.conj() * angle
+        driven += np.exp(duration * poles) * (free + missing)
+    amplitudes: FloatArray = np.abs(driven) / poles.imag
     return amplitudes
 
 
 def predict_residual(
-    arm: PlanarArm, effort: FloatArray, duration: float, box: UncertaintyBox
+    arm: PlanarArm,
+    effort: FloatArray,
+    duration: float,
+    box: UncertaintyBox,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> PredictedResidual:
     """
-    Return the residual of a motion from rest, on the nominal arm and at worst over a box.
+    Return the residual of a motion on the nominal arm, and the largest over a box.
 
     Parameters
     ----------
@@ -242,6 +261,9 @@ def predict_residual(
         Length of the motion [s].
     box
         What may differ.
+    start
+        Angle and velocity of the passive joint at the start [rad], [rad/s], taken to be the same
+        on every arm.
 
     Raises
     ------
@@ -252,7 +274,8 @@ def predict_residual(
     oscillator = Oscillator.of(arm)
     edges = box.edges(oscillator, duration)
     factors = np.concatenate([np.ones((1, 2)), *edges])
-    amplitudes = residual_amplitude(oscillator, effort, duration, oscillator.poles(factors))
+    poles = oscillator.poles(factors)
+    amplitudes = residual_amplitude(oscillator, effort, duration, poles, start)
     worst, place = largest(edges, amplitudes[1:])
     nominal = float(amplitudes[0])
     return PredictedResidual(
