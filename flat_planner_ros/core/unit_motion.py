@@ -150,7 +150,7 @@ def unit_motion(key: bytes) -> UnitMotion:
     """
     coefficients = np.frombuffer(key)
     law = MotionLaw(duration=2.0, modes=unit_modes(coefficients))
-    jet = law.terms.at(_probes(), 2 * CONDITIONS)
+    jet = law.terms.at(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     ends = zip(*jet[:CONDITIONS, [0, -1]].T.tolist(), peaks.tolist(), strict=False)
     # Relative to the start, as the value's own peak is the distance.
@@ -169,11 +169,11 @@ def unit_motion(key: bytes) -> UnitMotion:
 
 
 @cache
-def _probes() -> FloatArray:
+def probes() -> FloatArray:
     """
     Return x + 1 and 1 - x at times that crowd towards the start as fast as boundary layers can.
 
-    The law is odd: one half is enough. The last two are the middle and the end.
+    Those from 0 to 1, of which one half of a motion has enough, and last the end, 2.
     """
     layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
     times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
