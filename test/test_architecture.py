@@ -53,6 +53,8 @@ MAY_IMPORT = {
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
     'robustness': 'arm errors',
     'insensitivity': 'robustness arm errors',
+    'shaping': 'arm errors',
+    'tradeoff': 'planning plan_samples shaping insensitivity robustness cost arm errors',
     'momentum': 'flatness arm errors',
     'insensitive': 'insensitivity momentum robustness flatness arm errors',
     'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',

@@ -16,6 +16,7 @@ from flat_planner_ros.core.errors import (
     InvalidModel,
     InvalidRequest,
     NotFlat,
+    OutOfReach,
     UncertifiedPlan,
 )
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
@@ -28,6 +29,14 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.insensitive import least_effort, rehearse
+from flat_planner_ros.core.insensitivity import (
+    Criterion,
+    DEFAULT_WEIGHT,
+    Insensitivity,
+    MAX_INSENSITIVITY,
+    Nominal,
+)
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
@@ -42,11 +51,25 @@ from flat_planner_ros.core.planning import (
     PlanSamples,
     ViaPoint,
 )
+from flat_planner_ros.core.robustness import (
+    MAX_HALF_WIDTH,
+    predict_residual,
+    PredictedResidual,
+    UncertaintyBox,
+)
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.tradeoff import (
+    advice,
+    baselines,
+    predicted_residual,
+    tradeoff,
+    TradeoffPoint,
+)
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -54,10 +77,14 @@ __all__ = [
     'ActuatedJoints',
     'Adoption',
     'AdoptionRefused',
+    'advice',
     'ArmState',
+    'baselines',
     'bodies_of_constants',
     'bodies_of_links',
     'check_point_count',
+    'Criterion',
+    'DEFAULT_WEIGHT',
     'EffortProfile',
     'fit_oscillation',
     'flat_map',
@@ -67,14 +94,18 @@ __all__ = [
     'Goal',
     'GoalPoint',
     'identify',
+    'Insensitivity',
     'InvalidCommand',
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
     'JointSample',
     'Law',
+    'least_effort',
     'Level',
     'LinkBody',
+    'MAX_HALF_WIDTH',
+    'MAX_INSENSITIVITY',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
@@ -82,8 +113,10 @@ __all__ = [
     'MotionLaw',
     'MotionRequest',
     'NaturalMode',
+    'Nominal',
     'NotFlat',
     'OscillationFit',
+    'OutOfReach',
     'PacedArm',
     'Plan',
     'plan',
@@ -92,8 +125,12 @@ __all__ = [
     'PlannerSession',
     'PlanningOptions',
     'PlanSamples',
+    'predict_residual',
+    'predicted_residual',
+    'PredictedResidual',
     'QuadraticCost',
     'Reason',
+    'rehearse',
     'ReportedEstimate',
     'RequestRejected',
     'Residual',
@@ -102,14 +139,19 @@ __all__ = [
     'select',
     'Sensing',
     'SessionSettings',
+    'shaped_quintic',
+    'Shaper',
     'SimulatedArm',
     'SimulationSettings',
     'StartSource',
     'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
+    'tradeoff',
+    'TradeoffPoint',
+    'UncertaintyBox',
     'UncertifiedPlan',
+    'ViaPoint',
     'VibrationMonitor',
     'VibrationReport',
-    'ViaPoint',
 ]

@@ -10,7 +10,7 @@ points of its boundary (docs/derivation.md, section 9).
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from math import ceil, log10, sqrt
+from math import ceil, log10, sqrt, tau
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
@@ -20,7 +20,7 @@ from flat_planner_ros.core.insensitivity import (
     Criterion,
     DEFAULT_WEIGHT,
     Insensitivity,
-    MAX_WEIGHT,
+    MAX_INSENSITIVITY,
     Nominal,
 )
 from flat_planner_ros.core.momentum import (
@@ -141,6 +141,24 @@ def shaped_motion(
     """
     is_bounded = wanted.max_effort_rms > 0.0 or wanted.max_residual > 0.0
     return _solved(arm, duration, wanted, abs(distance) if is_bounded else 1.0)
+
+
+def rehearse(arm: PlanarArm, wanted: Insensitivity) -> None:
+    """
+    Solve a problem of this kind, so that it is known to have a solution and libraries are loaded.
+
+    Raises
+    ------
+    InvalidRequest
+        An arm in the box does not oscillate.
+    NotFlat
+        The arm is not flat.
+
+    """
+    if wanted.max_effort_rms > 0.0 or wanted.max_residual > 0.0:
+        import scipy.optimize  # noqa: F401  What the search takes, a fifth of a second to load.
+    period = tau / Oscillator.of(arm).frequency
+    _Problem.of(arm, period, wanted).solve(DEFAULT_WEIGHT)
 
 
 @lru_cache(maxsize=MOTIONS_KEPT)
@@ -299,7 +317,7 @@ class _Problem:
         for _ in range(MAX_ROUNDS):
             weighted = matrix.T * np.tile(total * shares, 2)
             hessian, gradient = identity + weighted @ matrix, weighted @ start
-            c: FloatArray = -np.linalg.solve(hessian, gradient)
+            c = np.asarray(-np.linalg.solve(hessian, gradient), dtype=float)
             residuals = matrix @ c + start
             squares = residuals[:points] ** 2 + residuals[points:] ** 2
             mean = float(shares @ squares)
@@ -409,7 +427,7 @@ def _search(
         known[exponent] = problem.solve(10.0**exponent, shares)
         return log10(share(known[exponent].c))
 
-    low, high = log10(MIN_WEIGHT), log10(MAX_WEIGHT)
+    low, high = log10(MIN_WEIGHT), log10(MAX_INSENSITIVITY)
     # The bound holds at one end of the range if it can hold at all.
     safe, other = (low, high) if rises else (high, low)
     if miss(safe) >= 0.0:

@@ -10,7 +10,7 @@ from flat_planner_ros.core.robustness import UncertaintyBox
 DEFAULT_WEIGHT = 500.0
 """Weight where nothing is chosen: a residual of 1/500 of the way costs as much as all effort."""
 
-MAX_WEIGHT = 1e5
+MAX_INSENSITIVITY = 1e5
 """Largest weight: beyond, the effort is that of the smallest residual anyway."""
 
 MIN_MODES, MAX_MODES = 6, 48
@@ -89,9 +89,9 @@ class Insensitivity:
                 f'insensitivity is chosen by one of weight, max_effort_rms and max_residual, got '
                 f'{" and ".join(chosen)}: set the others to 0'
             )
-        if self.weight > MAX_WEIGHT:
+        if self.weight > MAX_INSENSITIVITY:
             raise InvalidRequest(
-                f'insensitivity.weight must be at most {MAX_WEIGHT:g}, got {self.weight:g}'
+                f'insensitivity.weight must be at most {MAX_INSENSITIVITY:g}, got {self.weight:g}'
             )
         if not MIN_MODES <= self.modes <= MAX_MODES:
             raise InvalidRequest(

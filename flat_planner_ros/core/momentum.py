@@ -251,7 +251,8 @@ def _split(torque: FloatArray, delta: float, epsilon: float, duration: float) ->
     slope = np.zeros((size, size))
     for k in range(1, size):
         slope[:k, k] = legendre.legder(np.eye(size)[k])[:k]
-    table: FloatArray = np.linalg.solve(np.eye(size) + delta * slope + epsilon * slope @ slope, sigma.T).T
+    operator = np.eye(size) + delta * slope + epsilon * slope @ slope
+    table = np.asarray(np.linalg.solve(operator, sigma.T).T, dtype=float)
     table.setflags(write=False)
     rate = (-delta + 1j * np.sqrt(4.0 * epsilon - delta**2)) / (2.0 * epsilon)
     # The fourth derivative of w starts at rest: there the particular solution is smallest.

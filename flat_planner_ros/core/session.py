@@ -6,7 +6,7 @@ from enum import Enum
 from math import inf
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
@@ -221,6 +221,10 @@ class PlannerSession:
         )
         try:
             planned = plan(request, settings.arm, settings.options)
+        except OutOfReach as error:
+            raise RequestRejected(
+                Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
+            ) from error
         except UncertifiedPlan as error:
             raise RequestRejected(
                 Reason.ILL_CONDITIONED,

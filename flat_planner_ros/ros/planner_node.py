@@ -169,7 +169,14 @@ class PlannerNode(Node):
             motion = self._session.launched(self._now())
             # The verdict's peaks take a while: the plant need not wait for them.
             self._publish_motion(motion)
-            status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)
+            status = diagnostics.accepted_status(
+                motion,
+                goal,
+                self._joints,
+                elapsed,
+                with_advice=self._settings.report_advice,
+                with_baselines=self._settings.report_baselines,
+            )
         self._publish_status(status)
         return status
 

@@ -9,11 +9,13 @@ from flat_planner_ros.core import (
     MAX_WEIGHT,
     PlanningOptions,
     QuadraticCost,
+    rehearse,
     SessionSettings,
     StartSource,
     Strategy,
     strategy_cost,
 )
+from flat_planner_ros.ros.insensitivity_parameters import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
 import numpy as np
 from rclpy.parameter import Parameter
@@ -34,6 +36,8 @@ class PlannerSettings:
         Rate of `~/reference` [Hz].
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
+    report_advice, report_baselines
+        What the verdict on a goal says besides.
 
     """
 
@@ -43,6 +47,8 @@ class PlannerSettings:
     absolute_stamp: bool
     reference_rate: float
     auto_tune: bool
+    report_advice: bool
+    report_baselines: bool
 
 
 ROWS = [
@@ -72,6 +78,7 @@ ROWS = [
         default=Parameter.Type.DOUBLE_ARRAY,
         description='36 numbers, row by row: the cost of the strategy custom',
     ),
+    *INSENSITIVITY_ROWS,
     Row(
         name='flat_model',
         default=FlatModel.EXACT.value,
@@ -192,6 +199,16 @@ ROWS = [
         description='adopt each trustworthy estimate that the monitor makes after a motion',
     ),
     Row(
+        name='report_advice',
+        default=True,
+        description='say in the verdict on a goal when a little more time would pay',
+    ),
+    Row(
+        name='report_baselines',
+        default=False,
+        description='state in the verdict on a goal what simpler methods would leave behind',
+    ),
+    Row(
         name='stream_effort',
         default=False,
         description='stream ~/effort_commands; not yet available',
@@ -219,7 +236,10 @@ def build(values: Values) -> PlannerSettings:
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
+        insensitivity=insensitivity_of(values),
     )
+    if options.strategy is Strategy.INSENSITIVE:
+        rehearse(arm, options.insensitivity)
     # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
     strategy_cost(
         options.strategy,
@@ -251,6 +271,8 @@ def build(values: Values) -> PlannerSettings:
         absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
+        report_advice=values['report_advice'],
+        report_baselines=values['report_baselines'],
     )
 
 

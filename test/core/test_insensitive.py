@@ -16,7 +16,7 @@ from flat_planner_ros.core.robustness import (
     residual_amplitude,
     UncertaintyBox,
 )
-from flat_planner_ros.core.simulation import rollout
+from flat_planner_ros.core.rollout import rollout
 import numpy as np
 import pytest
 
