@@ -33,7 +33,15 @@ from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.pacing import PacedArm, SimulationSettings
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.planning import (
+    Law,
+    MotionRequest,
+    Plan,
+    plan,
+    PlanningOptions,
+    PlanSamples,
+    ViaPoint,
+)
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
 from flat_planner_ros.core.simulation import ArmState, rollout, SimulatedArm
@@ -62,6 +70,7 @@ __all__ = [
     'InvalidModel',
     'InvalidRequest',
     'JointSample',
+    'Law',
     'Level',
     'LinkBody',
     'MAX_WEIGHT',
@@ -100,4 +109,5 @@ __all__ = [
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',
+    'ViaPoint',
 ]
