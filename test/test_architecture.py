@@ -50,7 +50,10 @@ MAY_IMPORT = {
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'session': 'planning goal motion_record cost flatness arm errors',
+    'timeline': 'planning plan_samples',
+    'stopping': 'planning extremal solutions errors',
+    'session': 'stopping timeline planning plan_samples solutions goal motion_record cost '
+    'flatness arm errors',
     'request': 'solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',

@@ -43,8 +43,15 @@ from flat_planner_ros.core.planning import (
     ViaPoint,
 )
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import (
+    Ended,
+    Outcome,
+    PlannerSession,
+    SessionSettings,
+    StartSource,
+)
 from flat_planner_ros.core.simulation import ArmState, rollout, SimulatedArm
+from flat_planner_ros.core.timeline import Motion, Track
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -57,6 +64,7 @@ __all__ = [
     'bodies_of_links',
     'check_point_count',
     'EffortProfile',
+    'Ended',
     'fit_oscillation',
     'flat_map',
     'FlatMap',
@@ -82,6 +90,7 @@ __all__ = [
     'NaturalMode',
     'NotFlat',
     'OscillationFit',
+    'Outcome',
     'PacedArm',
     'Plan',
     'plan',
@@ -106,6 +115,7 @@ __all__ = [
     'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
+    'Track',
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',

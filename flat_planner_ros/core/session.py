@@ -10,8 +10,8 @@ from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
 from flat_planner_ros.core.motion_record import JointSample
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
 from flat_planner_ros.core.plan_samples import PlanSamples
+from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
 from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.stopping import stop_plan
 from flat_planner_ros.core.timeline import Motion, Timeline, Track
@@ -240,9 +240,8 @@ class PlannerSession:
             start_jets=origin.jets,
         )
         planned = self._planned(request, settings.options, origin)
-        self._count += 1
         motion = Motion(
-            plan_id=self._count,
+            plan_id=self._count + 1,
             plan=planned,
             samples=planned.sample(settings.period),
             start=origin.time,
@@ -289,11 +288,13 @@ class PlannerSession:
 
     def ended(self, now: float) -> list[Ended]:
         """Return, once, the motions that have come to an end or been replaced."""
-        ended, self._ended = self._ended, []
-        for motion in self._timeline.motions:
-            if motion.cut is None and motion.end <= now:
-                outcome = Outcome.STOPPED if motion.stops else Outcome.FINISHED
-                ended.append(Ended(motion, outcome))
+        ended = [
+            Ended(motion, Outcome.STOPPED if motion.stops else Outcome.FINISHED)
+            for motion in self._timeline.motions
+            if motion.cut is None and motion.end <= now
+        ]
+        ended += self._ended
+        self._ended = []
         self._timeline = self._timeline.after(now)
         return ended
 
@@ -375,7 +376,8 @@ class PlannerSession:
             for old in self._timeline.replaced(motion.start):
                 if not (motion.stops and old.plan_id == motion.plan_id):
                     self._ended.append(Ended(old, Outcome.PREEMPTED))
-            self._timeline = self._timeline.with_motion(motion, now)
+            self._timeline = self._timeline.with_motion(motion)
+        self._count = motion.plan_id if not motion.stops else self._count
         self._motion = motion
         return motion
 

@@ -6,12 +6,9 @@ planned variable is zero at the end ((62) of docs/derivation.md); it is linear i
 so that two laws tell where that is.
 """
 
-from dataclasses import replace
-
-from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import UncertifiedPlan
 from flat_planner_ros.core.extremal import momentum_of
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan
+from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
 from flat_planner_ros.core.solutions import CONDITIONS
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +21,8 @@ SHORTEST = 1.0 / 64.0
 HALVINGS = 7
 """Halvings of the range of durations, in logarithm: finds the stop within 3 %."""
 
-PEAK_TOLERANCE = 1e-3
-"""What a stop may demand above the motion that it ends [-]."""
+DEMAND = 2.0
+"""Peaks that a stop may reach, in terms of those of the motion that it ends [-]."""
 
 REST_DURATION = 0.1
 """Longest stop of an arm that does not move yet [s]."""
@@ -34,17 +31,17 @@ PROBE = 1.0
 """Distance between the two final values that are tried [rad]."""
 
 
-def stop_plan(
-    running: Plan, pose: FloatArray, jets: FloatArray | None, remaining: float
-) -> Plan:
+def stop_plan(running: Plan, pose: FloatArray, jets: FloatArray | None, remaining: float) -> Plan:
     """
-    Return the shortest plan to rest that demands no more than the motion that it ends.
+    Return the shortest plan to rest that demands little more than the motion that it ends.
+
+    Its peaks of effort and velocity stay below twice the motion's: with the same effort, a motion
+    that is optimal cannot be stopped much before its end.
 
     Parameters
     ----------
     running
-        The plan that is being carried out: its peaks of effort and velocity bound those of the
-        stop, its model and cost are kept.
+        The plan that is being carried out, whose model and cost are kept.
     pose
         Angles of all joints at the start of the stop, shape (n,) [rad].
     jets
@@ -55,15 +52,11 @@ def stop_plan(
 
     """
     arm, options = running.task.arm, running.options
-    if options.strategy is Strategy.INSENSITIVE:
-        options = replace(options, strategy=Strategy.POLYNOMIAL)
     if jets is None:
-        request = MotionRequest(
-            start=pose, final=pose, duration=min(remaining, REST_DURATION)
-        )
+        request = MotionRequest(start=pose, final=pose, duration=min(remaining, REST_DURATION))
         return plan(request, arm, options)
-    effort = running.peak_effort * (1.0 + PEAK_TOLERANCE)
-    velocity = running.peak_velocity * (1.0 + PEAK_TOLERANCE)
+    effort = DEMAND * running.peak_effort
+    velocity = DEMAND * running.peak_velocity
     best = _stop(running, options, pose, jets, remaining)
     shortest, longest = SHORTEST * remaining, remaining
     for _ in range(HALVINGS):
@@ -80,14 +73,18 @@ def stop_plan(
     return best
 
 
-def _stop(running: Plan, options, pose, jets, duration: float) -> Plan:
+def _stop(
+    running: Plan,
+    options: PlanningOptions,
+    pose: FloatArray,
+    jets: FloatArray,
+    duration: float,
+) -> Plan:
     """Return the plan to rest of a given duration that costs least."""
     arm = running.task.arm
     first, second = (
         plan(
-            MotionRequest(
-                start=pose, final=_pose(values), duration=duration, start_jets=jets
-            ),
+            MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets),
             arm,
             options,
         )
@@ -104,10 +101,7 @@ def _end_momenta(planned: Plan) -> FloatArray:
     coefficients = planned.cost.characteristic()
     end = np.array([planned.duration])
     return np.array(
-        [
-            momentum_of(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0]
-            for law in planned.laws
-        ]
+        [momentum_of(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0] for law in planned.laws]
     )
 
 

@@ -133,12 +133,12 @@ class Timeline:
         """Return the timeline without what has come to its end."""
         return Timeline([motion for motion in self.motions if now < motion.end])
 
-    def with_motion(self, motion: Motion, now: float) -> 'Timeline':
+    def with_motion(self, motion: Motion) -> 'Timeline':
         """Return the timeline in which a motion replaces all that was planned from its start."""
         kept = [
             replace(old, cut=motion.start) if motion.start < old.end else old
             for old in self.motions
-            if now < old.end and old.start < motion.start
+            if old.start < motion.start
         ]
         return Timeline([*kept, motion])
 
@@ -163,7 +163,11 @@ class Timeline:
         # Later points stay on the old grid to the last bit: what is being played does not change.
         origin = float(first.samples.times[max(begun, 0)])
         start = first.start + origin
-        pieces = [_piece(motion, max(begun, 0) if motion is first else 0) for motion in left]
+        pieces = []
+        for motion, after in zip(left, [*left[1:], None], strict=True):
+            until = np.inf if after is None else after.start - SEAM_TOLERANCE - motion.start
+            end = int(np.searchsorted(motion.samples.times, until))
+            pieces.append((motion.samples, slice(max(begun, 0) if motion is first else 0, end)))
         shifts = [-origin, *(motion.start - start for motion in left[1:])]
         return Track(
             start=start,
@@ -175,16 +179,9 @@ class Timeline:
             ),
             flat=np.concatenate([samples.flat[:, :, chosen] for samples, chosen in pieces], 2),
             **{
-                name: np.concatenate([getattr(samples, name)[chosen] for samples, chosen in pieces])
+                name: np.concatenate(
+                    [getattr(samples, name)[chosen] for samples, chosen in pieces]
+                )
                 for name in ('positions', 'velocities', 'accelerations', 'efforts')
             },
         )
-
-
-def _piece(motion: Motion, begin: int) -> tuple[PlanSamples, slice]:
-    """Return which samples of a motion are sent, from a given one on."""
-    samples = motion.samples
-    end = len(samples.times)
-    if motion.cut is not None:
-        end = int(np.searchsorted(samples.times, motion.cut - motion.start - SEAM_TOLERANCE))
-    return samples, slice(begin, max(end, begin))

@@ -1,10 +1,10 @@
 """Stream of efforts for executors that take one effort after the other, not a trajectory."""
 
 from flat_planner_ros.core import PlannerSession
-from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros import conversions
 import numpy as np
 from rclpy.node import Node
-from std_msgs.msg import Float64MultiArray
+from rclpy.publisher import Publisher
 
 FINAL_ZEROS = 10
 """Zeros at the end of a motion: one that is lost leaves no joint driven."""
@@ -20,18 +20,18 @@ class EffortStream:
     Parameters
     ----------
     node
-        Whose clock and interface are used.
+        Whose clock is used.
+    publisher
+        Of std_msgs/Float64MultiArray.
     session
         Knows what is planned.
 
     """
 
-    def __init__(self, node: Node, session: PlannerSession) -> None:
+    def __init__(self, node: Node, publisher: Publisher, session: PlannerSession) -> None:
         """Stream nothing until configured."""
         self._node, self._session = node, session
-        self._publisher = node.create_publisher(
-            Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
-        )
+        self._publisher = publisher
         self._timer = None
         self._period = 0.0
         self._zeros_left = 0

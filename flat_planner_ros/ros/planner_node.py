@@ -22,6 +22,7 @@ from flat_planner_ros.ros.parameters import model_parameters, NodeParameters
 from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -43,7 +44,8 @@ class PlannerNode(Node):
         self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
         self._flat_plan = publish(JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED)
-        self._efforts = EffortStream(self, self._session)
+        efforts = publish(Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE)
+        self._efforts = EffortStream(self, efforts, self._session)
         self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
         self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.LATCHED_HISTORY)
         listen = self.create_subscription

@@ -204,7 +204,7 @@ ROWS = [
     Row(
         name='stream_effort',
         default=False,
-        description='publish ~/effort_commands, one effort per sampling.period, while the arm moves',
+        description='publish ~/effort_commands every sampling.period while the arm moves',
     ),
 ]
 """All parameters of the planner node."""
