@@ -71,6 +71,9 @@ class SessionSettings:
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
         The same while another motion is under way or waits for its start [s].
+    is_stamped
+        Whether the executor plays a command at its stamp; if it plays on arrival, no motion can
+        take over from another.
     execute
         Whether motions are carried out; if not, none keeps the session busy.
 
@@ -90,6 +93,7 @@ class SessionSettings:
     measurement_timeout: float = 0.5
     start_delay: float = 0.05
     lookahead: float = 0.1
+    is_stamped: bool = True
     execute: bool = True
 
     def __post_init__(self) -> None:
@@ -389,6 +393,12 @@ class PlannerSession:
         if not self._timeline.is_busy(now):
             time = now + settings.start_delay if stamp is None else stamp
             return Origin(time, np.array(self._start(now)))
+        if not settings.is_stamped:
+            raise RequestRejected(
+                Reason.BUSY,
+                'another motion is under way; none can take over from it as commands have no '
+                'stamp (command.stamp)',
+            )
         soonest = now + settings.lookahead
         time = self._timeline.seam(soonest) if stamp is None else stamp
         before = self._timeline.at(time)

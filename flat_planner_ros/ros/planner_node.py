@@ -210,13 +210,13 @@ class PlannerNode(Node):
         if settings.session.execute:
             is_whole = settings.include_passive_joint and settings.include_effort
             command = plan
-            if not (is_whole and settings.absolute_stamp):
+            if not (is_whole and settings.session.is_stamped):
                 command = conversions.command_bytes(
                     track,
                     self._joints,
                     include_passive_joint=settings.include_passive_joint,
                     include_effort=settings.include_effort,
-                    absolute_stamp=settings.absolute_stamp,
+                    absolute_stamp=settings.session.is_stamped,
                 )
             self._command.publish(command)
         self._plan.publish(plan)

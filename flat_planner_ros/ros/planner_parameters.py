@@ -28,7 +28,7 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
-    include_passive_joint, include_effort, absolute_stamp
+    include_passive_joint, include_effort
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
@@ -42,7 +42,6 @@ class PlannerSettings:
     session: SessionSettings
     include_passive_joint: bool
     include_effort: bool
-    absolute_stamp: bool
     reference_rate: float
     auto_tune: bool
     stream_effort: bool
@@ -253,13 +252,13 @@ def build(values: Values) -> PlannerSettings:
         measurement_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
+        is_stamped=values['command.stamp'] == 'absolute',
         execute=values['execute'],
     )
     return PlannerSettings(
         session=session,
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
-        absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
         stream_effort=values['stream_effort'],

@@ -190,6 +190,15 @@ def test_a_motion_that_waits_for_its_start_gives_way():
     assert planner.ended(NOW + 1.0) == [(first, Outcome.PREEMPTED)]
 
 
+def test_commands_without_a_stamp_cannot_be_spliced():
+    planner = session(is_stamped=False)
+    first = planner.submit(GOAL, NOW)
+    assert reason_of(planner.submit, BACK, first.end - 0.2).reason is Reason.BUSY
+    assert reason_of(planner.stop, first.end - 0.2).reason is Reason.BUSY
+    planner.measure(sample(position=(pi, 0.0), time=first.end))
+    assert planner.submit(BACK, first.end).plan_id == 2
+
+
 def test_planning_that_takes_too_long_leaves_the_motion_alone():
     planner = session()
     first = planner.submit(GOAL, NOW)
