@@ -40,29 +40,24 @@ class Controller:
     def faults(self) -> list[str]:
         """Return what keeps the controller from being configured."""
         commands, states = set(self.command_interfaces), set(self.state_interfaces)
+        joints, driven = set(self.joints), set(self.command_joints)
+        with_effort = ({'effort'}, {'effort', 'position'})
+        orders = [set(INTERFACES[:count]) for count in (1, 2, 3)]
         rules = {
-            'joints must be unique and at least one': len(set(self.joints)) == len(self.joints) > 0,
-            'command_joints must be a subset of joints': set(self.command_joints)
-            <= set(self.joints),
-            'command_interfaces must be known': bool(commands) and commands <= set(INTERFACES),
-            'state_interfaces must be known': bool(states) and states <= set(INTERFACES[:3]),
+            'joints must be unique and at least one': len(joints) == len(self.joints) > 0,
+            'command_joints must be a subset of joints': driven <= joints,
+            'command_interfaces must be known': commands and commands <= set(INTERFACES),
             'velocity goes alone or with position': 'velocity' not in commands
             or len(commands) == 1
             or 'position' in commands,
             'acceleration needs velocity or position': 'acceleration' not in commands
-            or bool(commands & {'velocity', 'position'}),
+            or commands & {'velocity', 'position'},
             'effort goes alone or with position': 'effort' not in commands
-            or commands in ({'effort'}, {'effort', 'position'}),
-            'effort and velocity need both states': not (
-                commands in ({'effort'}, {'effort', 'position'}, {'velocity'})
-            )
+            or commands in with_effort,
+            'effort or velocity alone need both states': commands
+            not in (*with_effort, {'velocity'})
             or states >= {'position', 'velocity'},
-            'states go position, velocity, acceleration': states
-            in (
-                {'position'},
-                {'position', 'velocity'},
-                {'position', 'velocity', 'acceleration'},
-            ),
+            'states go position, velocity, acceleration': states in orders,
         }
         return [rule for rule, holds in rules.items() if not holds]
 
@@ -126,8 +121,7 @@ def _arrays(msg: JointTrajectory) -> list[Sequence[float]]:
 REFUSALS = (
     Rule(
         'all joints',
-        "without allow_partial_joints_goal the message must have as many joints as the "
-        "controller",
+        'without allow_partial_joints_goal the message must have as many joints as the controller',
         lambda c, m, now: c.allow_partial_joints_goal or len(m.joint_names) == len(c.joints),
     ),
     Rule('some joints', 'joint_names must not be empty', lambda c, m, now: bool(m.joint_names)),
@@ -209,9 +203,7 @@ PRECAUTIONS = (
         'nothing left at the end',
         'the last point is held: an effort or acceleration in it would act for ever',
         lambda c, m, now: (
-            not any(
-                np.any(getattr(m.points[-1], field)) for field in ('accelerations', 'effort')
-            )
+            not any(np.any(getattr(m.points[-1], field)) for field in ('accelerations', 'effort'))
         ),
     ),
     Rule(
@@ -237,8 +229,6 @@ PRECAUTIONS = (
 
 def broken(controller: Controller, msg: JointTrajectory, now: float) -> list[str]:
     """Return the names of all rules that a message breaks."""
-    if not (msg.points and msg.joint_names):
-        rules = REFUSALS[:3]
-    else:
-        rules = (*REFUSALS, *PRECAUTIONS)
+    has_both = bool(msg.points and msg.joint_names)
+    rules = (*REFUSALS, *PRECAUTIONS) if has_both else REFUSALS[:3]
     return [rule.name for rule in rules if not rule.holds(controller, msg, now)]
