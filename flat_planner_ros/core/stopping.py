@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-SHORTEST = 1.0 / 64.0
+SHORTEST = 1.0 / 16.0
 """Shortest stop that is considered, in terms of the rest of the motion [-]."""
 
-HALVINGS = 7
-"""Halvings of the range of durations, in logarithm: finds the stop within 3 %."""
+HALVINGS = 6
+"""Halvings of the range of durations, in logarithm: finds the stop within 5 %."""
 
 DEMAND = 2.0
 """Peaks that a stop may reach, in terms of those of the motion that it ends [-]."""
