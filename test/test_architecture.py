@@ -49,7 +49,10 @@ MAY_IMPORT = {
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'session': 'planning goal motion_record cost flatness arm errors',
+    'extrema': 'planning plan_samples flatness arm errors',
+    'limits': 'extrema planning arm errors',
+    'duration': 'limits extrema planning arm errors',
+    'session': 'duration limits planning goal motion_record cost flatness arm errors',
     'request': 'cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'planning': 'task request plan_samples unit_motion solutions motion_law cost flatness arm '

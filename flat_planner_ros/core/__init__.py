@@ -8,6 +8,7 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
@@ -18,6 +19,7 @@ from flat_planner_ros.core.errors import (
     NotFlat,
     UncertifiedPlan,
 )
+from flat_planner_ros.core.extrema import Extrema, extrema, Quantity
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.goal import (
     check_point_count,
@@ -28,6 +30,7 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
@@ -46,6 +49,8 @@ __all__ = [
     'ArmState',
     'check_point_count',
     'EffortProfile',
+    'Extrema',
+    'extrema',
     'fit_oscillation',
     'flat_map',
     'FlatMap',
@@ -58,8 +63,10 @@ __all__ = [
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
+    'JointLimits',
     'JointSample',
     'Level',
+    'LimitUse',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
@@ -67,6 +74,7 @@ __all__ = [
     'MotionLaw',
     'MotionRequest',
     'NaturalMode',
+    'NoFeasibleDuration',
     'NotFlat',
     'OscillationFit',
     'PacedArm',
@@ -78,6 +86,7 @@ __all__ = [
     'PlanningOptions',
     'PlanSamples',
     'QuadraticCost',
+    'Quantity',
     'Reason',
     'ReportedEstimate',
     'RequestRejected',
@@ -87,6 +96,7 @@ __all__ = [
     'select',
     'Sensing',
     'SessionSettings',
+    'shortest_plan',
     'SimulatedArm',
     'SimulationSettings',
     'StartSource',
