@@ -22,6 +22,7 @@ MAY_IMPORT = {
     'errors': '',
     'links': 'errors',
     'arm': 'links errors',
+    'link_bodies': 'links errors',
     # the plant
     'interpolation': '',
     'effort_profile': 'interpolation errors',
@@ -49,14 +50,15 @@ MAY_IMPORT = {
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'extrema': 'planning plan_samples flatness arm errors',
-    'limits': 'extrema planning arm errors',
-    'duration': 'limits extrema planning arm errors',
+    'extrema': 'planning plan_samples solutions',
+    'limits': 'extrema planning errors',
+    'duration': 'limits extrema planning errors',
     'session': 'duration limits planning goal motion_record cost flatness arm errors',
-    'request': 'cost flatness errors',
+    'request': 'solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
-    'planning': 'task request plan_samples unit_motion solutions motion_law cost flatness arm '
-    'errors',
+    'course': 'task unit_motion quadrature solutions motion_law flatness',
+    'moving_start': 'task unit_motion extremal solutions motion_law',
+    'planning': 'moving_start course task request plan_samples cost flatness arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

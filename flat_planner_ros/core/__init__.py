@@ -31,11 +31,20 @@ from flat_planner_ros.core.goal import (
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
 from flat_planner_ros.core.limits import JointLimits, LimitUse
+from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.pacing import PacedArm, SimulationSettings
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.planning import (
+    Law,
+    MotionRequest,
+    Plan,
+    plan,
+    PlanningOptions,
+    PlanSamples,
+    ViaPoint,
+)
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
 from flat_planner_ros.core.simulation import ArmState, rollout, SimulatedArm
@@ -47,6 +56,8 @@ __all__ = [
     'Adoption',
     'AdoptionRefused',
     'ArmState',
+    'bodies_of_constants',
+    'bodies_of_links',
     'check_point_count',
     'EffortProfile',
     'Extrema',
@@ -65,8 +76,10 @@ __all__ = [
     'InvalidRequest',
     'JointLimits',
     'JointSample',
+    'Law',
     'Level',
     'LimitUse',
+    'LinkBody',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
@@ -106,4 +119,5 @@ __all__ = [
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',
+    'ViaPoint',
 ]

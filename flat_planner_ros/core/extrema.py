@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.plan_samples import PlanSamples
 from flat_planner_ros.core.planning import Plan
+from flat_planner_ros.core.solutions import CONDITIONS
 import numpy as np
 from numpy.typing import NDArray
 
@@ -147,14 +148,9 @@ def extrema(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> lis
     return found
 
 
-def _edges(plan: Plan) -> FloatArray:
-    """Return the times between which the laws are smooth, ends included [s]."""
-    return np.array([0.0, plan.request.duration])
-
-
 def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     """Return series of all joints' quantities, in the order of quantities and joints."""
-    edges = _edges(plan)
+    edges = np.array(plan.course.edges)
     fractions = np.array([0.0, 0.125, 0.5, 0.875])
     bounds = np.append((edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel(), edges[-1])
     starts, lengths = bounds[:-1], np.diff(bounds)
@@ -166,7 +162,7 @@ def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
         samples = plan.at(times.ravel())
         shape = (-1, len(starts), DEGREE + 1)
         values = np.stack([quantity.of(samples).T for quantity in quantities])
-        layers = np.reshape(samples.planned, (-1, samples.planned.shape[-2], times.size))[:, 1:6]
+        layers = samples.planned[:, 1:CONDITIONS]
         noise = NOISE * np.abs(values).max(axis=(1, 2), keepdims=True)
         noise = np.broadcast_to(noise[..., 0], values.shape[:2]).reshape(-1, 1)
         values, layers = values.reshape(shape), layers.reshape(shape)
@@ -289,7 +285,7 @@ class _Tables(NamedTuple):
 def _tables() -> _Tables:
     """Return the matrices of one segment."""
     nodes, search = (-np.cos(np.pi * np.arange(m + 1.0) / m) for m in (DEGREE, DENSITY * DEGREE))
-    to_series: FloatArray = np.linalg.inv(_basis(nodes)).T
+    to_series = np.linalg.inv(_basis(nodes)).T.astype(np.float64)
     unit = np.eye(DEGREE + 1)
     differentiation = np.zeros_like(unit)
     differentiation[:, :-1] = np.polynomial.chebyshev.chebder(unit, axis=1)

@@ -46,6 +46,11 @@ class LimitUse:
     time: float
     ratio: float
 
+    @property
+    def exceeded(self) -> bool:
+        """Tell whether the motion goes beyond the limit."""
+        return self.ratio > 1.0
+
     def sentence(self, name: str) -> str:
         """Return what happens to the joint of a name, with the numbers."""
         unit = self.quantity.unit
@@ -87,9 +92,8 @@ class JointLimits:
         sizes = {name: len(getattr(self, name)) for name in FIELDS}
         if len(set(sizes.values())) != 1:
             raise InvalidRequest(f'limits must be of the same joints, got {sizes}')
-        for joint, (low, high) in enumerate(
-            zip(self.position_min, self.position_max, strict=True)
-        ):
+        ranges = zip(self.position_min, self.position_max, strict=True)
+        for joint, (low, high) in enumerate(ranges):
             if not (low <= high and low < inf and high > -inf):
                 raise InvalidRequest(
                     f'joint {joint + 1} has no position within its limits: limits.position_min = '
@@ -159,9 +163,9 @@ class JointLimits:
 
     def worst(self, plan: Plan) -> LimitUse | None:
         """
-        Return the limit of which a plan uses most, between the samples too; None if none is finite.
+        Return the limit of which a plan uses most at any time; None if none is finite.
 
-        The plan obeys all limits if the ratio is at most one.
+        Unless it is exceeded, the plan obeys all limits.
         """
         return max(self.uses(plan), key=lambda use: use.ratio, default=None)
 
