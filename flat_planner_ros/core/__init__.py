@@ -19,7 +19,7 @@ from flat_planner_ros.core.errors import (
     NotFlat,
     UncertifiedPlan,
 )
-from flat_planner_ros.core.extrema import Extrema, extrema, Quantity
+from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.goal import (
     check_point_count,
@@ -61,7 +61,7 @@ __all__ = [
     'check_point_count',
     'EffortProfile',
     'Extrema',
-    'extrema',
+    'extrema_of',
     'fit_oscillation',
     'flat_map',
     'FlatMap',

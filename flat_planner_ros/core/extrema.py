@@ -118,7 +118,7 @@ class _Mesh:
     resolved: BoolArray
 
 
-def extrema(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> list[Extrema]:
+def extrema_of(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> list[Extrema]:
     """
     Return the extrema of every joint over the continuous motion.
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import inf
 
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.extrema import Extrema, extrema, Quantity
+from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning import Plan
 import numpy as np
 from numpy.typing import NDArray
@@ -191,7 +191,7 @@ class JointLimits:
         if not quantities:
             return []
         uses: list[LimitUse] = []
-        for quantity, found in zip(quantities, extrema(plan, quantities), strict=True):
+        for quantity, found in zip(quantities, extrema_of(plan, quantities), strict=True):
             if quantity is Quantity.POSITION:
                 uses += self._uses_of_position(plan, found)
             else:

@@ -1,11 +1,12 @@
 """Extrema between samples against dense sampling, closed forms and multiple precision; limits."""
 
+from dataclasses import replace
 from math import inf, nan, pi
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.extrema import extrema, Quantity
+from flat_planner_ros.core.extrema import extrema_of, Quantity
 from flat_planner_ros.core.flatness import FlatModel
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
@@ -52,6 +53,37 @@ def random_plan(rng):
     return plan(MotionRequest(start=start, final=final, duration=duration), arm, options)
 
 
+def random_motion_of_many_joints(rng, joints, moving):
+    """Return a plan of an arm in the vertical plane, with friction compensated."""
+    first = joints - 2
+    arm = PlanarArm.reduced(
+        inertia_star=(0.04, 0.01),
+        stiffness=2.0,
+        damping=0.01,
+        link_length=rng.uniform(0.2, 0.5, first),
+        link_com=rng.uniform(0.0, 0.2, first),
+        link_mass=rng.uniform(0.5, 2.0, first),
+        link_inertia=rng.uniform(0.005, 0.05, first),
+        tip_mass=1.5,
+        gravity=9.81,
+        viscous_friction=rng.uniform(0.0, 0.1, joints - 1),
+        coulomb_friction=rng.uniform(0.0, 0.2, joints - 1),
+    )
+    options = PlanningOptions(
+        strategy=Strategy.MIN_CONTROL_EFFORT,
+        r=10 ** rng.uniform(0.0, 1.5),
+        compensate_friction=True,
+    )
+    start, final = (np.append(rng.uniform(-2.0, 2.0, joints - 1), 0.0) for _ in range(2))
+    request = MotionRequest(start=start, final=final, duration=10 ** rng.uniform(-0.5, 1.0))
+    planned = plan(request, arm, options)
+    if not moving:
+        return planned
+    jets = planned.jets(np.array([0.4 * request.duration]))[:, :6, 0]
+    elsewhere = np.append(rng.uniform(-2.0, 2.0, joints - 1), 0.0)
+    return plan(replace(request, final=elsewhere, start_jets=jets), arm, options)
+
+
 def brute_force(planned):
     """Return samples on a grid that is even and, towards the ends, ever finer."""
     duration = planned.request.duration
@@ -64,7 +96,7 @@ def brute_force(planned):
 def test_no_sample_is_beyond_the_extrema_and_they_are_attained(seed):
     planned = random_plan(np.random.default_rng(seed))
     samples = brute_force(planned)
-    for quantity, found in zip(Quantity, extrema(planned), strict=True):
+    for quantity, found in zip(Quantity, extrema_of(planned), strict=True):
         values = quantity.of(samples)
         spread = np.ptp(values, axis=0)
         assert (values.max(axis=0) <= found.highest + ACCURACY * spread).all()
@@ -72,6 +104,22 @@ def test_no_sample_is_beyond_the_extrema_and_they_are_attained(seed):
         for extreme, at in ((found.highest, found.highest_at), (found.lowest, found.lowest_at)):
             attained = np.diagonal(quantity.of(planned.at(at)))
             assert attained == pytest.approx(extreme, rel=1e-12, abs=1e-12 * spread.max())
+
+
+@pytest.mark.parametrize('moving', [False, True], ids=['from rest', 'in motion'])
+@pytest.mark.parametrize('joints', [3, 4, 7])
+def test_extrema_of_efforts_that_are_not_linear_in_the_law(joints, moving):
+    rng = np.random.default_rng(joints)
+    for _ in range(4):
+        planned = random_motion_of_many_joints(rng, joints, moving)
+        samples = brute_force(planned)
+        for quantity, found in zip(Quantity, extrema_of(planned), strict=True):
+            values = quantity.of(samples)
+            spread = np.ptp(values, axis=0)
+            assert (values.max(axis=0) <= found.highest + ACCURACY * spread).all()
+            assert (values.min(axis=0) >= found.lowest - ACCURACY * spread).all()
+            assert (found.highest <= values.max(axis=0) + 1e-4 * spread).all()
+            assert (found.lowest >= values.min(axis=0) - 1e-4 * spread).all()
 
 
 def test_extrema_of_the_polynomial_law_are_roots_of_polynomials(paper_arm):
@@ -92,7 +140,7 @@ def test_extrema_of_the_polynomial_law_are_roots_of_polynomials(paper_arm):
         Quantity.VELOCITY: [position.deriv(), deflection.deriv()],
         Quantity.EFFORT: [torque, Polynomial([0.0])],
     }
-    for quantity, found in zip(Quantity, extrema(planned), strict=True):
+    for quantity, found in zip(Quantity, extrema_of(planned), strict=True):
         for joint, curve in enumerate(expected[quantity]):
             roots = curve.deriv().roots() if curve.degree() else np.array([])
             real = roots[np.abs(roots.imag) < 1e-7 * duration].real
@@ -123,7 +171,7 @@ def test_peak_torque_agrees_with_multiple_precision(oracle, paper_arm, strategy,
         jet = law.jet([time], 6)[order:, 0]
         return inner * jet[2] + compliant * (jet[4] - c / k * jet[5])
 
-    effort = extrema(planned, [Quantity.EFFORT])[0]
+    effort = extrema_of(planned, [Quantity.EFFORT])[0]
     for value, time in (
         (effort.highest[0], effort.highest_at[0]),
         (effort.lowest[0], effort.lowest_at[0]),
@@ -134,7 +182,7 @@ def test_peak_torque_agrees_with_multiple_precision(oracle, paper_arm, strategy,
 
 def test_a_thin_layer_between_coarse_nodes_is_found(paper_arm):
     planned = half_turn(paper_arm, 60.0, strategy=Strategy.MIN_POTENTIAL_ENERGY, p=1000.0, r=0.0)
-    effort = extrema(planned, [Quantity.EFFORT])[0]
+    effort = extrema_of(planned, [Quantity.EFFORT])[0]
     coarse = np.abs(planned.at(np.linspace(0.0, 60.0, 2001)).efforts[:, 0]).max()
     fine = np.abs(planned.at(np.geomspace(1e-6, 1.0, 20001)).efforts[:, 0]).max()
     assert fine > 10.0 * coarse  # else the case shows nothing
@@ -144,7 +192,7 @@ def test_a_thin_layer_between_coarse_nodes_is_found(paper_arm):
 
 def test_a_motion_over_no_distance_has_no_extent(paper_arm):
     request = MotionRequest(start=[0.3, 0.0], final=[0.3, 0.0], duration=1.0)
-    position, velocity, effort = extrema(plan(request, paper_arm, PlanningOptions()))
+    position, velocity, effort = extrema_of(plan(request, paper_arm, PlanningOptions()))
     assert position.highest.tolist() == position.lowest.tolist() == [0.3, 0.0]
     assert not velocity.peak.any()
     assert not effort.peak.any()
@@ -154,7 +202,7 @@ def test_a_limit_between_two_samples_counts(paper_arm):
     planned = half_turn(paper_arm)
     samples = planned.sample(0.05)
     sampled = np.abs(samples.efforts[:, 0]).max()
-    peak = extrema(planned, [Quantity.EFFORT])[0].peak[0]
+    peak = extrema_of(planned, [Quantity.EFFORT])[0].peak[0]
     limit = 0.5 * (sampled + peak)
     assert sampled < limit < peak
     violation = JointLimits.of(2, effort=[limit, inf]).worst(planned)
@@ -168,7 +216,7 @@ def test_a_limit_between_two_samples_counts(paper_arm):
 
 def test_what_is_just_within_its_limits_obeys_and_what_is_just_beyond_does_not(paper_arm):
     planned = half_turn(paper_arm)
-    found = dict(zip(Quantity, extrema(planned), strict=True))
+    found = dict(zip(Quantity, extrema_of(planned), strict=True))
     position = found[Quantity.POSITION]
     exact = {
         'position_min': position.lowest,
