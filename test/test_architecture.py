@@ -55,8 +55,11 @@ MAY_IMPORT = {
     'goal': 'errors',
     'timeline': 'planning plan_samples',
     'stopping': 'planning extremal solutions errors',
-    'session': 'stopping timeline planning plan_samples solutions goal motion_record cost '
-    'flatness arm errors',
+    'extrema': 'planning plan_samples solutions',
+    'limits': 'extrema planning errors',
+    'duration': 'limits extrema planning errors',
+    'session': 'stopping timeline duration limits planning plan_samples solutions goal '
+    'motion_record cost flatness arm errors',
     'request': 'solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
