@@ -39,6 +39,8 @@ setup(
             'drake>=1.30,<2; sys_platform == "linux" and platform_machine == "x86_64"',
             'matplotlib>=3.6,<4',
         ],
+        # Second opinions on the URDF; tests that want one of them are skipped without it.
+        'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],
         'test': [
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
@@ -57,6 +59,7 @@ setup(
             'plant_node = flat_planner_ros.ros.plant_node:main',
             'monitor_node = flat_planner_ros.ros.monitor_node:main',
             'demo = flat_planner_ros.ros.demo:main',
+            'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',
         ],
     },

@@ -28,11 +28,20 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.pacing import PacedArm, SimulationSettings
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.planning import (
+    Law,
+    MotionRequest,
+    Plan,
+    plan,
+    PlanningOptions,
+    PlanSamples,
+    ViaPoint,
+)
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
 from flat_planner_ros.core.simulation import ArmState, rollout, SimulatedArm
@@ -44,6 +53,8 @@ __all__ = [
     'Adoption',
     'AdoptionRefused',
     'ArmState',
+    'bodies_of_constants',
+    'bodies_of_links',
     'check_point_count',
     'EffortProfile',
     'fit_oscillation',
@@ -59,7 +70,9 @@ __all__ = [
     'InvalidModel',
     'InvalidRequest',
     'JointSample',
+    'Law',
     'Level',
+    'LinkBody',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
@@ -96,4 +109,5 @@ __all__ = [
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',
+    'ViaPoint',
 ]

@@ -67,6 +67,13 @@ class Row:
     infinite: bool = False
 
     @property
+    def type(self) -> Parameter.Type:
+        """Return the type of its value."""
+        if isinstance(self.default, Parameter.Type):
+            return self.default
+        return Parameter.Type.from_parameter_value(self.default)
+
+    @property
     def constraints(self) -> str:
         """Return the allowed values in words."""
         if self.choices:
@@ -149,8 +156,9 @@ class NodeParameters(Generic[Settings]):
         self._rows = {row.name: row for row in rows}
         self._build = build
         self._apply = apply
-        _report_unknown(node, list(self._rows))
-        defaults = _model_defaults(node)
+        overrides = {name: p.value for name, p in node._parameter_overrides.items()}
+        refuse_unknown(overrides, list(self._rows), node.get_logger().warning)
+        defaults = model_defaults(overrides)
         for row in rows:
             _declare(node, row, defaults.get(row.name, row.default))
         self.settings = self._checked({})
@@ -262,10 +270,6 @@ def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
         raise InvalidParameter(
             'joints must name the joints in kinematic order, e.g. joints: [joint1, joint2]'
         )
-    if len(joints) > 2:
-        raise InvalidParameter(
-            f'arms with {len(joints)} joints are not available in this version, only 2'
-        )
     common = {name: _required(values, f'model.{name}') for name in ('stiffness', 'damping')}
     common['gravity'] = values.get('model.gravity', 0.0)
     for kind in ('viscous', 'coulomb'):
@@ -322,9 +326,9 @@ def _required(values: Values, name: str) -> Any:
     return values[name]
 
 
-def _model_defaults(node: Node) -> Values:
-    """Return the example arm for a node that is given nothing of a model, else nothing."""
-    if any(name == 'joints' or name.startswith('model.') for name in node._parameter_overrides):
+def model_defaults(overrides: Values) -> Values:
+    """Return the example arm where nothing of a model is given, else nothing."""
+    if any(name == 'joints' or name.startswith('model.') for name in overrides):
         return {}
     return EXAMPLE_ARM
 
@@ -335,15 +339,17 @@ def _declare(node: Node, row: Row, default: Any) -> None:
         node.declare_parameter(row.name, default, row.descriptor())
     except InvalidParameterValueException as error:
         value = node._parameter_overrides[row.name].value
-        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value}') from error
+        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value:g}') from error
     except InvalidParameterTypeException as error:
-        expected = row.default
-        if not isinstance(expected, Parameter.Type):
-            expected = Parameter.Type.from_parameter_value(expected)
-        raise InvalidParameter(
-            f'{row.name} must be of type {expected.name.lower().replace("_", " ")}'
-            f'{TYPE_HINTS.get(expected, "")}, got {node._parameter_overrides[row.name].value!r}'
-        ) from error
+        raise wrong_type(row, node._parameter_overrides[row.name].value) from error
+
+
+def wrong_type(row: Row, value: Any) -> InvalidParameter:
+    """Return the complaint about a value of another type than the parameter's."""
+    return InvalidParameter(
+        f'{row.name} must be of type {row.type.name.lower().replace("_", " ")}'
+        f'{TYPE_HINTS.get(row.type, "")}, got {value!r}'
+    )
 
 
 TYPE_HINTS = {
@@ -356,12 +362,12 @@ TYPE_HINTS = {
 """What to write for a value of the wrong type."""
 
 
-def _report_unknown(node: Node, known: list[str]) -> None:
+def refuse_unknown(overrides: Values, known: Sequence[str], warn: Callable[[str], object]) -> None:
     """Refuse a misspelt name, and mention one that means nothing here: ROS drops both silently."""
-    for name in node._parameter_overrides:
+    for name in overrides:
         if name in known or name == 'use_sim_time' or name.startswith('qos_overrides.'):
             continue
         similar = get_close_matches(name, known, n=1, cutoff=TYPO_SIMILARITY)
         if similar:
             raise InvalidParameter(f'unknown parameter {name}; did you mean {similar[0]}?')
-        node.get_logger().warning(f'parameter {name} is unknown here and has no effect')
+        warn(f'parameter {name} is unknown here and has no effect')
