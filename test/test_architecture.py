@@ -27,8 +27,11 @@ MAY_IMPORT = {
     'interpolation': '',
     'effort_profile': 'interpolation errors',
     'simulation': 'effort_profile arm errors',
+    'rollout': 'simulation effort_profile arm errors',
     'sensing': 'simulation errors',
-    'pacing': 'sensing simulation effort_profile arm errors',
+    'simulation_settings': 'sensing simulation arm errors',
+    'troubles': 'simulation errors',
+    'pacing': 'simulation_settings troubles sensing simulation effort_profile arm errors',
     # the monitor
     'oscillation_search': 'errors',
     'oscillation': 'oscillation_search errors',

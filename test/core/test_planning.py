@@ -10,7 +10,7 @@ from flat_planner_ros.core.errors import InvalidCost, InvalidRequest, NotFlat, U
 from flat_planner_ros.core.extremal import Jets
 from flat_planner_ros.core.flatness import FlatModel
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
-from flat_planner_ros.core.simulation import EffortProfile, rollout
+from flat_planner_ros.core.rollout import EffortProfile, rollout
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
