@@ -2,7 +2,7 @@
 Coupling of segments at via points: one banded linear system for a whole path.
 
 Unknown are the weights of every segment's twelve solutions; equations are the conditions at the
-start, at each via point and at the end ((49), (50) of docs/derivation.md). Weights rather than the
+start, at each via point and at the end ((V5) of docs/derivation.md). Weights rather than the
 jets at the via points, because two points close to each other fix the jets between them far more
 stiffly than their neighbours do: in the jets' normal equations the neighbours drown, here each
 condition keeps its own scale.
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.certificate import BOUNDARY_TOLERANCE
 from flat_planner_ros.core.errors import UncertifiedPlan
 from flat_planner_ros.core.segment_basis import SegmentBasis, SOLUTIONS
 from flat_planner_ros.core.solutions import CONDITIONS
@@ -102,7 +101,7 @@ class Coupling:
         target = self._target(start, steps)
         factors, pivots, failure = dgbtrf(self._banded(), BAND, BAND)
         if failure:
-            raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
+            raise UncertifiedPlan('boundary residual', inf, 0.0)
         weights, _ = dgbtrs(factors, BAND, BAND, target, pivots)
         for _ in range(RESIDUAL_STEPS):
             residual = target - self._applied(weights)
@@ -217,10 +216,9 @@ def _joint_factors(rates: FloatArray) -> FloatArray:
     Return factors of the conditions at joints, as `_end_factors` for two solutions of each rate.
 
     Slow solutions of the two segments meet the values, and the pair of the i-th rate the
-    derivatives 2 i - 3 and 2 i - 2 ((51) of docs/derivation.md).
+    derivatives 2 i - 3 and 2 i - 2 ((V6) of docs/derivation.md).
     """
     steps = np.ones((len(rates), SOLUTIONS))
     steps[:, 2::2] = 1.0 / np.sqrt(rates[:, :-1] * rates[:, 1:])
     steps[:, 3::2] = 1.0 / rates[:, 1:]
-    factors: FloatArray = np.cumprod(steps, axis=1)
-    return factors
+    return np.asarray(np.cumprod(steps, axis=1), dtype=np.float64)

@@ -3,7 +3,7 @@ Basis of a segment: the twelve solutions of the Euler-Lagrange equation between 
 
 Unlike a whole motion from rest to rest, a segment meets no condition at its ends by itself; its
 neighbours share them. What the coupling needs are the derivatives of every solution at both ends,
-up to the eleventh ((48) of docs/derivation.md).
+up to the eleventh ((V4) of docs/derivation.md).
 """
 
 from dataclasses import dataclass

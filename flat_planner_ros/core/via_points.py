@@ -2,24 +2,20 @@
 Optimal path: the motion law of least cost through given values at given times.
 
 Between via points it solves the Euler-Lagrange equation; at a via point everything is continuous
-but the momentum that belongs to the prescribed value (docs/derivation.md, section 9).
+but the momentum that belongs to the prescribed value (docs/derivation.md, section V).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import ceil, inf, log2
+from math import ceil, log2
 
-from flat_planner_ros.core.certificate import (
-    BOUNDARY_TOLERANCE,
-    certify,
-    OPTIMALITY_TOLERANCE,
-)
 from flat_planner_ros.core.cost import QuadraticCost
 from flat_planner_ros.core.coupling import coupling, Weights
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.extremal import momentum_of, stationarity_residual
 from flat_planner_ros.core.motion_law import MotionLaw
+from flat_planner_ros.core.moving_start import MAX_DERIVATIVE
 from flat_planner_ros.core.piecewise_law import PiecewiseLaw
 from flat_planner_ros.core.segment_basis import segment_basis, SegmentBasis, SOLUTIONS
 from flat_planner_ros.core.solutions import CONDITIONS
@@ -89,10 +85,11 @@ class OptimalPath:
         Integral of Y^T Q Y over the motion, summed over the variables.
     time_slopes
         Derivatives of the cost with respect to the times of the via points, duration and values
-        fixed ((54) of docs/derivation.md), shape (p - 1,) [1/s].
+        fixed ((V9) of docs/derivation.md), shape (p - 1,) [1/s].
     boundary_residual
         Largest miss of a prescribed derivative or value, jump of the derivatives 0 to 5, or last
-        correction of a derivative, relative to that derivative's peak [-].
+        correction of a derivative, relative to that derivative's peak; at least the rounding of
+        the times relative to the shortest segment [-].
     optimality_residual
         Largest residual of the Euler-Lagrange equation on a segment or of a natural condition,
         relative to its terms [-].
@@ -108,26 +105,22 @@ class OptimalPath:
 
 def optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
     """
-    Return the laws of least cost through a path.
+    Return the laws of least cost through a path, to be judged by their residuals.
 
     Raises
     ------
     UncertifiedPlan
-        The laws cannot be computed to the promised accuracy in double precision.
+        The conditions are singular in double precision.
+    ArithmeticError
+        The numbers leave double precision.
 
     """
-    try:
-        with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
-            result = _optimal_path(cost, path)
-    except ArithmeticError as error:
-        raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE) from error
-    certify('boundary residual', result.boundary_residual, BOUNDARY_TOLERANCE)
-    certify('optimality residual', result.optimality_residual, OPTIMALITY_TOLERANCE)
-    return result
+    with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
+        return _optimal_path(cost, path)
 
 
 def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
-    """Return the laws, not yet certified."""
+    """Return the laws of least cost; numbers out of range are errors."""
     coefficients = cost.characteristic()
     halves = 0.5 * np.diff(path.edges)
     powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
@@ -137,7 +130,9 @@ def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
     origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
     steps = path.values - origins
     weights, correction = _weights(bases, halves, path, steps)
-    laws, value, boundary, optimality = [], 0.0, 0.0, 0.0
+    # Times are rounded: a segment's length is known to this part of it, and slopes with it.
+    boundary = float(np.finfo(float).eps * path.edges[-1] / (2.0 * halves.min()))
+    laws, value, optimality = [], 0.0, 0.0
     slopes = np.zeros(len(bases) - 1)
     for variable, relaxation in enumerate(path.relaxations):
         segments = tuple(
@@ -154,6 +149,8 @@ def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
         joints = np.array([jet[:, 1] for jet in jets[:-1]]).reshape(-1, SOLUTIONS + 1)
         slopes += 2.0 * np.diff(momenta) * (joints[:, 1] + relaxation * joints[:, 2])
         peaks = _peaks(path.start[variable, 0], jets)
+        if not peaks.max() < MAX_DERIVATIVE:
+            raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
         boundary = max(
             boundary,
             _relative(correction[:, variable], peaks[: CONDITIONS + 1]),
@@ -194,14 +191,9 @@ def _probed(law: MotionLaw, basis: SegmentBasis) -> FloatArray:
 
     The probes crowd towards the ends as far as boundary layers can reach, shape (13, m).
     """
-    depth = min(MAX_DEPTH, ceil(log2(basis.rates[-1])) + 3)
-    near = _near(depth)
-    after = np.concatenate([[0.0, 2.0], near, 2.0 - near, [1.0]])
-    before = np.concatenate([[2.0, 0.0], 2.0 - near, near, [1.0]])
-    jet = law.terms.at(after, before, SOLUTIONS)
-    jet *= ((2.0 / law.duration) ** np.arange(SOLUTIONS + 1.0))[:, None]
-    jet[0] += law.offset
-    return jet
+    near = _near(min(MAX_DEPTH, ceil(log2(basis.rates[-1])) + 3))
+    times = 0.5 * law.duration * np.concatenate([[0.0, 2.0], near, 2.0 - near, [1.0]])
+    return law.jet(times, SOLUTIONS)
 
 
 @cache
@@ -227,9 +219,7 @@ def _boundary_residual(
     return _relative(missed, peaks)
 
 
-def _natural_residual(
-    relaxation: float, jets: Sequence[FloatArray], peaks: FloatArray
-) -> float:
+def _natural_residual(relaxation: float, jets: Sequence[FloatArray], peaks: FloatArray) -> float:
     """Return the largest jump of a quantity that is continuous along an optimal path."""
     left, right = _sides(jets)
     jumps = np.abs(right - left)[:, CONDITIONS : SOLUTIONS - 1].max(axis=0, initial=0.0)
@@ -266,7 +256,7 @@ def _share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
     """
     Return what a moving start adds to the sum of momenta times steps, with the opposite sign.
 
-    Sum over i = 1 ... 5 of w^(i) times the momentum (52) of docs/derivation.md.
+    Sum over i = 1 ... 5 of w^(i) times the momentum (V7) of docs/derivation.md.
     """
     share = 0.0
     for i in range(1, CONDITIONS):

@@ -2,13 +2,15 @@
 Times of via points that have none: those at which the optimal path is cheapest.
 
 The path itself is solved exactly for any times, and its cost has a derivative with respect to each
-of them ((54) of docs/derivation.md). So the times are refined by a quasi-Newton method on the same
+of them ((V9) of docs/derivation.md). So the times are refined by a quasi-Newton method on the same
 cost that the strategy minimises, the duration kept.
 """
 
 from functools import partial
+from math import inf
 
 from flat_planner_ros.core.cost import QuadraticCost
+from flat_planner_ros.core.errors import UncertifiedPlan
 from flat_planner_ros.core.via_points import optimal_path, Path
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +51,7 @@ def allocate_times(cost: QuadraticCost, path: Path) -> FloatArray:
     Raises
     ------
     UncertifiedPlan
-        A path cannot be computed to the promised accuracy.
+        A path on the way cannot be computed in double precision.
 
     """
     from scipy.optimize import minimize  # here: slow to import, and only for goals without times
@@ -62,13 +64,16 @@ def allocate_times(cost: QuadraticCost, path: Path) -> FloatArray:
         return np.linspace(0.0, duration, count + 1)
     # Between constant speed and equal times: the ends are at rest, the rest is passed at speed.
     guess = np.log(np.maximum(np.sqrt(lengths / lengths.max()), LEAST_SHARE))
-    found = minimize(
-        partial(_log_cost, cost, path),
-        guess - guess.mean(),
-        jac=True,
-        method='BFGS',
-        options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
-    )
+    try:
+        found = minimize(
+            partial(_log_cost, cost, path),
+            guess - guess.mean(),
+            jac=True,
+            method='BFGS',
+            options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
+        )
+    except ArithmeticError as error:
+        raise UncertifiedPlan('boundary residual', inf, 0.0) from error
     return _edges(found.x, duration)
 
 
@@ -86,9 +91,7 @@ def _edges(logarithms: FloatArray, duration: float) -> FloatArray:
     return np.concatenate([[0.0], duration * inner, [duration]])
 
 
-def _log_cost(
-    cost: QuadraticCost, path: Path, logarithms: FloatArray
-) -> tuple[float, FloatArray]:
+def _log_cost(cost: QuadraticCost, path: Path, logarithms: FloatArray) -> tuple[float, FloatArray]:
     """Return the logarithm of the cost and its gradient."""
     duration = float(path.edges[-1])
     edges = _edges(logarithms, duration)
