@@ -11,12 +11,11 @@ from functools import lru_cache
 
 from flat_planner_ros.core.modes import Mode, series_derivatives
 from flat_planner_ros.core.roots import clusters
-from flat_planner_ros.core.solutions import ALTERNATING, block_of, CONDITIONS
+from flat_planner_ros.core.solutions import ALTERNATING, Block, block_of, CONDITIONS
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 SOLUTIONS = 2 * CONDITIONS
 """Solutions of the equation, and derivatives of each that are coupled: orders 0 to 11."""
@@ -25,6 +24,9 @@ BASES_KEPT = 256
 """Bases that are remembered: those of several paths of fifty via points."""
 
 _MIRRORED = np.tile(ALTERNATING, 2)
+
+_ALONE = np.array([[1.0 + 0.0j], [-1j]])
+"""Series of one exponential: its real and its imaginary part."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,8 +37,8 @@ class SegmentBasis:
     Attributes
     ----------
     groups
-        Solutions that differ only in their series: rate, origin and series, shape (functions,
-        terms); columns below follow this order.
+        Blocks of solutions, each with whether its mirror image is meant; columns below follow
+        this order.
     at_start, at_end
         Derivatives 0 to 11 of every solution at x = -1 and x = 1, shape (12, 12) [-].
     rates
@@ -45,22 +47,18 @@ class SegmentBasis:
 
     """
 
-    groups: tuple[tuple[complex, int, ComplexArray], ...]
+    groups: tuple[tuple[Block, bool], ...]
     at_start: FloatArray
     at_end: FloatArray
     rates: FloatArray
 
     def modes(self, weights: FloatArray) -> tuple[Mode, ...]:
         """Return the modes of a combination of the solutions, shape of the weights (12,)."""
-        modes, first = [], 0
-        for rate, origin, series in self.groups:
-            last = first + len(series)
-            coefficients = weights[first:last] @ series
-            if origin < 0:
-                mode = Mode(rate=-rate, origin=1, coefficients=coefficients).mirrored(1.0)
-            else:
-                mode = Mode(rate=rate, origin=origin, coefficients=coefficients)
-            modes.append(mode)
+        modes, first, numbers = [], 0, weights.tolist()
+        for block, is_image in self.groups:
+            last = first + len(block.columns)
+            mode = Mode(block.rate, block.origin, block.combined(numbers[first:last]))
+            modes.append(mode.mirrored(1.0) if is_image else mode)
             first = last
         return tuple(modes)
 
@@ -77,7 +75,7 @@ def segment_basis(key: bytes) -> SegmentBasis:
 
     """
     found = sorted(clusters(np.frombuffer(key)), key=lambda cluster: abs(cluster.centre))
-    groups: list[tuple[complex, int, ComplexArray]] = []
+    groups: list[tuple[Block, bool]] = []
     rates: list[float] = []
     starts, ends = [], []
     for cluster in found:
@@ -85,14 +83,13 @@ def segment_basis(key: bytes) -> SegmentBasis:
         rates += [even.growth] * len(even.columns)
         if even.origin == 0:
             for block in (even, block_of(cluster, -1.0)):
-                groups.append((block.rate, 0, block.series))
-                starts.append(_derivatives(block.rate, block.series, -1.0))
-                ends.append(_derivatives(block.rate, block.series, 1.0))
+                groups.append((block, False))
+                starts.append(_derivatives(block, -1.0))
+                ends.append(_derivatives(block, 1.0))
             continue
-        near = _derivatives(even.rate, even.series, 0.0)
-        far = _derivatives(even.rate, even.series, -2.0)
+        near, far = _derivatives(even, 0.0), _derivatives(even, -2.0)
         # Each solution by itself, not odd and even ones: a boundary layer stays at its own end.
-        groups += [(even.rate, 1, even.series), (-even.rate, -1, even.series)]
+        groups += [(even, False), (even, True)]
         starts += [far, _MIRRORED * near]
         ends += [near, _MIRRORED * far]
     return SegmentBasis(
@@ -103,15 +100,16 @@ def segment_basis(key: bytes) -> SegmentBasis:
     )
 
 
-def _derivatives(rate: complex, series: ComplexArray, u: float) -> FloatArray:
-    """Return derivatives 0 to 11 of Re(exp(rate u) * power series) at u, shape (rows, 12)."""
+def _derivatives(block: Block, u: float) -> FloatArray:
+    """Return derivatives 0 to 11 of a block's solutions at a distance from their origin."""
+    series = _ALONE[: len(block.columns)] if block.series is None else block.series
     powers = u ** np.arange(series.shape[1], dtype=float)
     # Leibniz's rule, one order at a time: (D + rate)^k applied to the series.
     plain = np.einsum('rtk,t->rk', series_derivatives(series, SOLUTIONS - 1), powers)
     binomial = np.zeros((SOLUTIONS, SOLUTIONS), dtype=complex)
     with np.errstate(under='ignore'):
-        binomial[0, 0] = np.exp(rate * u)
+        binomial[0, 0] = np.exp(block.rate * u)
         for k in range(1, SOLUTIONS):
-            binomial[k] = rate * binomial[k - 1]
+            binomial[k] = block.rate * binomial[k - 1]
             binomial[k, 1:] += binomial[k - 1, :-1]
         return np.asarray((plain @ binomial.T).real)

@@ -247,7 +247,7 @@ def test_a_path_from_rest_to_rest_can_be_run_backwards(costs, name):
 @pytest.mark.parametrize('relaxation', [0.0, RELAXATION])
 @pytest.mark.parametrize('gap', 10.0 ** -np.arange(2.0, 13.0))
 def test_nearly_coincident_times_are_right_or_refused(costs, oracle, name, relaxation, gap):
-    """Where accepted, the path is that of one point with the velocity that the two prescribe."""
+    """Times are refused only where rounding has the better of them."""
     import path_oracle
 
     edges, values = (0.0, 1.0, 1.0 + gap, 2.0), (1.0, 1.0 + 3.0 * gap, 2.0)
