@@ -85,7 +85,7 @@ def boundary_value(tolerance: float, *, plain: bool = False) -> Callable[[], Sol
     def prepare() -> Solver:
         from scipy.integrate import solve_bvp
 
-        mapping = flat_map(problem.arm())
+        mapping = flat_map(problem.arm(), problem.MODEL)
         cost = strategy_cost(problem.OPTIONS.strategy, mapping, r=problem.WEIGHT)
         a = cost.characteristic()
         # Time in units of the fastest even rate, so that all twelve unknowns are of one size.

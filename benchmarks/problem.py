@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from flat_planner_ros.core import (
     flat_map,
+    FlatModel,
     MotionRequest,
     PlanarArm,
     PlanningOptions,
@@ -71,10 +72,13 @@ def request(distance: float = DISTANCE, duration: float = DURATION) -> MotionReq
     )
 
 
-OPTIONS = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, r=WEIGHT)
+MODEL = FlatModel.APPROXIMATE
+"""The reference numbers are those of the paper's torque."""
+
+OPTIONS = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, r=WEIGHT, flat_model=MODEL)
 """What is minimised."""
 
-EFFORT_ROW = flat_map(arm()).effort
+EFFORT_ROW = flat_map(arm(), MODEL).effort
 """Torque as a combination of y to y^(5)."""
 
 

@@ -27,8 +27,11 @@ MAY_IMPORT = {
     'interpolation': '',
     'effort_profile': 'interpolation errors',
     'simulation': 'effort_profile arm errors',
+    'rollout': 'simulation effort_profile arm errors',
     'sensing': 'simulation errors',
-    'pacing': 'sensing simulation effort_profile arm errors',
+    'simulation_settings': 'sensing simulation arm errors',
+    'troubles': 'simulation errors',
+    'pacing': 'simulation_settings troubles sensing simulation effort_profile arm errors',
     # the monitor
     'oscillation_search': 'errors',
     'oscillation': 'oscillation_search errors',
@@ -51,10 +54,11 @@ MAY_IMPORT = {
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
     'session': 'planning goal motion_record cost flatness arm errors',
-    'request': 'cost flatness errors',
+    'request': 'solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
-    'planning': 'task request plan_samples unit_motion solutions motion_law cost flatness arm '
-    'errors',
+    'course': 'task unit_motion quadrature solutions motion_law flatness',
+    'moving_start': 'task unit_motion extremal solutions motion_law',
+    'planning': 'moving_start course task request plan_samples cost flatness arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

@@ -32,11 +32,21 @@ from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_lin
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
 from flat_planner_ros.core.oscillation import fit_oscillation, OscillationFit
-from flat_planner_ros.core.pacing import PacedArm, SimulationSettings
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.pacing import PacedArm
+from flat_planner_ros.core.planning import (
+    Law,
+    MotionRequest,
+    Plan,
+    plan,
+    PlanningOptions,
+    PlanSamples,
+    ViaPoint,
+)
+from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
-from flat_planner_ros.core.simulation import ArmState, rollout, SimulatedArm
+from flat_planner_ros.core.simulation import ArmState, SimulatedArm
+from flat_planner_ros.core.simulation_settings import SimulationSettings
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -62,6 +72,7 @@ __all__ = [
     'InvalidModel',
     'InvalidRequest',
     'JointSample',
+    'Law',
     'Level',
     'LinkBody',
     'MAX_WEIGHT',
@@ -100,4 +111,5 @@ __all__ = [
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',
+    'ViaPoint',
 ]

@@ -374,12 +374,19 @@ class PlanarArm:
             that motors at the other joints can bring about.
 
         """
+        effort = self.rigid_effort(q, dq, ddq)
+        effort[..., :-1] += self.friction(dq)
+        effort[..., -1] -= self.passive_effort(q[..., -1], dq[..., -1])
+        return effort
+
+    def rigid_effort(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Return the effort M ddq + b + g of a motion, without friction and spring, (..., n)."""
         theta = np.cumsum(q, axis=-1)
         apart = _apart(theta)
         momentum_rate = _apply(self._link_inertia(apart), np.cumsum(ddq, axis=-1))
-        effort = (momentum_rate + self._centrifugal(apart, dq) + self._weight(theta)) @ self._sum
-        effort[..., :-1] += self.friction(dq)
-        effort[..., -1] -= self.passive_effort(q[..., -1], dq[..., -1])
+        effort: Array = (
+            momentum_rate + self._centrifugal(apart, dq) + self._weight(theta)
+        ) @ self._sum
         return effort
 
     def forward_dynamics(self, q: Array, dq: Array, effort: Array) -> Array:

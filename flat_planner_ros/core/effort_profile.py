@@ -12,6 +12,16 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+MAX_EFFORT = 1e6
+"""Largest effort of a command [N m]: no motor of a robot gives more, a broken sender may."""
+
+
+MAX_POSITION = 1e6
+"""Largest angle of a command [rad]; as for goals."""
+
+MAX_VELOCITY = 1e4
+"""Largest velocity of a command [rad/s]: six hundred times the fastest motion of pi in 1 s."""
+
 
 class JointReference(NamedTuple):
     """
@@ -42,9 +52,9 @@ class EffortProfile:
     """
     A stamped effort command, played by time like joint_trajectory_controller does.
 
-    Efforts are linear between the points. The last point is held after the end. Before the first
-    point the effort goes linearly from the anchor to it; nothing is applied before the start when
-    there is no anchor.
+    It is checked as a whole before any of it is played. Efforts are linear between the points. The
+    last point is held after the end. Before the first point the effort goes linearly from the
+    anchor to it; nothing is applied before the start when there is no anchor.
 
     Attributes
     ----------
@@ -53,9 +63,11 @@ class EffortProfile:
     times
         Times of the points from the start, increasing, shape (m,) [s].
     efforts
-        Efforts of the actuated joints, exactly zero at the end, shape (m, n-1) [N m].
+        Efforts of the actuated joints, exactly zero at the end, shape (m, n-1) [N m]. Where they
+        are not, nobody could know when to let go, and a ramp to zero would be another motion.
     positions, velocities
-        References for feedback, shape (m, n-1) [rad], [rad/s]; both or only positions or none.
+        Where the arm should be, shape (m, n-1) [rad], [rad/s]; both or only positions or none;
+        velocities are zero at the end.
     anchor_time, anchor_effort
         Time at which the command was taken over [s] and the effort then, shape (n-1,) [N m].
 
@@ -91,6 +103,7 @@ class EffortProfile:
             )
         if efforts[-1].any():
             raise InvalidCommand(f'the last effort must be 0 N m, got {efforts[-1]}')
+        check_bound('effort', efforts, MAX_EFFORT, 'N m')
         if self.velocities is not None and self.positions is None:
             raise InvalidCommand('velocities need positions')
         if (self.anchor_time is None) != (self.anchor_effort is None):
@@ -99,6 +112,14 @@ class EffortProfile:
             object.__setattr__(self, name, value)
         self._lock_optional('positions', self.positions, efforts.shape, 'rad')
         self._lock_optional('velocities', self.velocities, efforts.shape, 'rad/s')
+        if self.positions is not None:
+            check_bound('position', self.positions, MAX_POSITION, 'rad')
+        if self.velocities is not None:
+            check_bound('velocity', self.velocities, MAX_VELOCITY, 'rad/s')
+            if self.velocities[-1].any():
+                raise InvalidCommand(
+                    f'the last velocity must be 0 rad/s, got {self.velocities[-1]}'
+                )
         self._lock_optional('anchor_time', self.anchor_time, (), 's')
         self._lock_optional('anchor_effort', self.anchor_effort, efforts.shape[1:], 'N m')
 
@@ -175,3 +196,10 @@ def locked(name: str, value: npt.ArrayLike, unit: str) -> Array:
         raise InvalidCommand(f'{name} must be finite, got a value that is not [{unit}]')
     array.setflags(write=False)
     return array
+
+
+def check_bound(name: str, values: Array, bound: float, unit: str) -> None:
+    """Refuse numbers that no robot has to do with."""
+    largest = float(np.abs(values).max())
+    if largest > bound:
+        raise InvalidCommand(f'{name} of {largest:.3g} {unit} is beyond {bound:g} {unit}')

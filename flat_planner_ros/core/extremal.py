@@ -66,20 +66,33 @@ def extremal(coefficients: FloatArray, duration: float, jets: Jets) -> MotionLaw
         The boundary conditions are singular in double precision.
 
     """
+    return extremals(coefficients, duration, [jets])[0]
+
+
+def extremals(coefficients: FloatArray, duration: float, jets: Sequence[Jets]) -> list[MotionLaw]:
+    """Return the stationary laws of one equation for several pairs of ends, as `extremal`."""
     half = 0.5 * duration
     powers = half**_ORDERS
-    start, end = jets.start * powers[:CONDITIONS], jets.end * powers[:CONDITIONS]
     found = clusters(coefficients * powers[::-1] ** 2)
-    middle = 0.5 * (jets.start[0] + jets.end[0])
-    modes = [Mode(rate=0j, origin=0, coefficients=np.array([complex(middle)]))] if middle else []
-    mirrored = ALTERNATING * start
-    for parity in (-1.0, 1.0):
-        # Right-hand side of the law's odd or even part about the middle, at the end x = 1.
-        target = 0.5 * (end + parity * mirrored)
-        target[0] -= middle if parity > 0.0 else 0.0
-        if target.any():
-            modes.extend(_fitted(found, parity, target))
-    return MotionLaw(duration=duration, modes=tuple(modes))
+    solvers: dict[float, _BoundarySolver] = {}
+    laws = []
+    for ends in jets:
+        start, end = ends.start * powers[:CONDITIONS], ends.end * powers[:CONDITIONS]
+        middle = 0.5 * (ends.start[0] + ends.end[0])
+        modes = []
+        if middle:
+            modes.append(Mode(rate=0j, origin=0, coefficients=np.array([complex(middle)])))
+        mirrored = ALTERNATING * start
+        for parity in (-1.0, 1.0):
+            # Right-hand side of the law's odd or even part about the middle, at the end x = 1.
+            target = 0.5 * (end + parity * mirrored)
+            target[0] -= middle if parity > 0.0 else 0.0
+            if target.any():
+                if parity not in solvers:
+                    solvers[parity] = _BoundarySolver(found, parity)
+                modes.extend(solvers[parity].modes(target))
+        laws.append(MotionLaw(duration=duration, modes=tuple(modes)))
+    return laws
 
 
 def euler_lagrange_residual(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> float:
@@ -127,24 +140,32 @@ def momentum_of(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
     return momentum
 
 
-def _fitted(found: Sequence[Cluster], parity: float, target: FloatArray) -> list[Mode]:
-    """Return the modes of the combination of solutions that meets a jet at x = 1."""
-    ordered = sorted(found, key=lambda cluster: abs(cluster.centre))
-    blocks = [block_of(cluster, parity) for cluster in ordered]
-    matrix = np.array([column for block in blocks for column in block.columns]).T
-    rows = _row_factors([block.growth for block in blocks for _ in block.columns])
-    matrix *= rows[:, None]
-    columns = 1.0 / np.abs(matrix).max(axis=0)
-    matrix *= columns
-    try:
-        inverse = np.linalg.inv(matrix)
-    except np.linalg.LinAlgError as error:
-        raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
-    target = rows * target
-    weights = inverse @ target
-    for _ in range(RESIDUAL_STEPS):
-        weights += inverse @ (target - matrix @ weights)
-    return _combined(blocks, columns * weights, parity)
+class _BoundarySolver:
+    """Fits the solutions of one parity to jets at x = 1; the matrix is inverted once."""
+
+    def __init__(self, found: Sequence[Cluster], parity: float) -> None:
+        """Scale the conditions' matrix and invert it."""
+        ordered = sorted(found, key=lambda cluster: abs(cluster.centre))
+        self._parity = parity
+        self._blocks = [block_of(cluster, parity) for cluster in ordered]
+        matrix = np.array([column for block in self._blocks for column in block.columns]).T
+        self._rows = _row_factors([b.growth for b in self._blocks for _ in b.columns])
+        matrix *= self._rows[:, None]
+        self._columns = 1.0 / np.abs(matrix).max(axis=0)
+        matrix *= self._columns
+        self._matrix = matrix
+        try:
+            self._inverse = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError as error:
+            raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
+
+    def modes(self, target: FloatArray) -> list[Mode]:
+        """Return the modes of the combination of solutions that meets a jet."""
+        target = self._rows * target
+        weights = self._inverse @ target
+        for _ in range(RESIDUAL_STEPS):
+            weights += self._inverse @ (target - self._matrix @ weights)
+        return _combined(self._blocks, self._columns * weights, self._parity)
 
 
 def _combined(blocks: Sequence[Block], weights: FloatArray, parity: float) -> list[Mode]:

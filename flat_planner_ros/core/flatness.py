@@ -55,7 +55,7 @@ class FlatMap:
             row.setflags(write=False)
 
 
-def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.APPROXIMATE) -> FlatMap:
+def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.EXACT) -> FlatMap:
     """
     Return the flat map of an arm.
 

@@ -1,13 +1,15 @@
 """A simulated arm in time with a clock: even samples, bounded catching up, nothing hidden."""
 
-from dataclasses import dataclass, field, replace
-from math import ceil, floor, isfinite
+from dataclasses import replace
+from math import floor
 
-from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidCommand, InvalidModel
-from flat_planner_ros.core.sensing import Sensing, Sensor
+from flat_planner_ros.core.sensing import Sensor
 from flat_planner_ros.core.simulation import ArmState, GRID_TOLERANCE, SimulatedArm
+from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.troubles import Troubles
+import numpy as np
 import numpy.typing as npt
 
 MAX_CATCH_UP = 1.0
@@ -33,50 +35,6 @@ FAR_AHEAD = 600.0
 """Time to its start from which a command looks as if it came by another clock [s]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SimulationSettings:
-    """
-    What is simulated, and how it is sampled.
-
-    Attributes
-    ----------
-    arm
-        The arm as it is.
-    position
-        Joint angles at rest at the start and after a reset [rad].
-    rate
-        Samples per second of simulated time [Hz].
-    step
-        Longest integration step [s]; the step taken divides the time between samples.
-    saturation, feedback_p, feedback_d
-        As in SimulatedArm.
-    sensing
-        Imperfections of the sensors.
-
-    """
-
-    arm: PlanarArm
-    position: tuple[float, ...]
-    rate: float = 200.0
-    step: float = 1e-3
-    saturation: tuple[float, ...] | None = None
-    feedback_p: tuple[float, ...] | None = None
-    feedback_d: tuple[float, ...] | None = None
-    sensing: Sensing = field(default_factory=Sensing)
-
-    def __post_init__(self) -> None:
-        """Refuse times without meaning."""
-        for name, unit in {'rate': 'Hz', 'step': 's'}.items():
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0.0):
-                raise InvalidModel(f'{name} must be finite and above 0 {unit}, got {value}')
-
-    @property
-    def steps_per_sample(self) -> int:
-        """Return the number of integration steps from one sample to the next."""
-        return max(1, ceil(1.0 / (self.rate * self.step) - GRID_TOLERANCE))
-
-
 class PacedArm:
     """
     A simulated arm that keeps in time with a clock and shows itself at even times.
@@ -86,8 +44,9 @@ class PacedArm:
 
     An arm that follows makes up for a lag by integrating it. A lag beyond MAX_CATCH_UP is
     skipped: the arm stands still in it, as if the world had been stopped, and keeps position and
-    velocity; its command goes on by time, the part in between is lost. A clock that was set back
-    takes the arm's time with it, and the command is dropped, lest it is played twice.
+    velocity; a command that has begun by then is dropped, since a part of it is lost. A clock that
+    was set back takes the arm's time with it, and the command is dropped, lest it is played twice.
+    Nothing is applied where a command was dropped.
 
     Parameters
     ----------
@@ -123,7 +82,7 @@ class PacedArm:
         self._profile: EffortProfile | None = None
         self._wall: float | None = None
         self._debt = 0.0
-        self._skipped = self._lost = self._set_back = 0.0
+        self._troubles = Troubles()
 
     @property
     def settings(self) -> SimulationSettings:
@@ -133,9 +92,15 @@ class PacedArm:
     @settings.setter
     def settings(self, settings: SimulationSettings) -> None:
         """Go on with another arm or other sensors, from the same state."""
-        kept = replace(settings, arm=self._settings.arm, sensing=self._settings.sensing)
+        kept = replace(
+            settings,
+            arm=self._settings.arm,
+            sensing=self._settings.sensing,
+            start_tolerance=self._settings.start_tolerance,
+            input_timeout=self._settings.input_timeout,
+        )
         if kept != self._settings:
-            raise InvalidModel('only the arm and its sensors may change while it moves')
+            raise InvalidModel('only the arm, sensors and tolerances may change while it moves')
         self._simulated.arm = settings.arm
         if settings.sensing != self._settings.sensing:
             self._sensor = Sensor(settings.sensing)
@@ -173,7 +138,8 @@ class PacedArm:
         Raises
         ------
         InvalidCommand
-            If it has ended or does not suit the arm. The present command then goes on.
+            If it has ended, does not suit the arm or is elsewhere by now, or if the arm has been
+            stopped. The present command then goes on.
 
         """
         now = self.time
@@ -182,6 +148,7 @@ class PacedArm:
                 f'it ended at {profile.end:.6f} s, {now - profile.end:.3f} s before the present '
                 f'{now:.6f} s'
             )
+        self._refuse_jump(profile, now)
         self._play(profile)
         ahead = profile.start - now
         if ahead < -self._simulated.step:
@@ -194,8 +161,21 @@ class PacedArm:
         return ''
 
     def hold(self, effort: npt.ArrayLike) -> None:
-        """Apply a constant effort, shape (n-1,) [N m], until the next command."""
-        self._simulated.hold(effort)
+        """
+        Apply an effort until the next one comes, for the settings' input_timeout at most.
+
+        Parameters
+        ----------
+        effort
+            Shape (n-1,) [N m].
+
+        Raises
+        ------
+        InvalidCommand
+            As of SimulatedArm.hold.
+
+        """
+        self._simulated.hold(effort, self._simulated.time + self._settings.input_timeout)
         self._profile = None
 
     def reset(self) -> None:
@@ -227,7 +207,7 @@ class PacedArm:
         if lag > MAX_CATCH_UP:
             self._skip(floor(lag * self._settings.rate) / self._settings.rate)
         elif lag < -MAX_BACKWARD:
-            self._set_back -= lag
+            self._troubles.set_back -= lag
             self._offset += lag
             self._drop()
         return self._advance(now - self._offset)
@@ -261,7 +241,8 @@ class PacedArm:
         self._debt -= self._simulated.time - before
         limit = max(BATCH, factor * MAX_CATCH_UP)
         if self._debt > limit:
-            self._lost, self._debt = self._lost + self._debt - limit, limit
+            self._troubles.behind += self._debt - limit
+            self._debt = limit
         return samples
 
     def call_rate(self, factor: float) -> float:
@@ -273,27 +254,8 @@ class PacedArm:
 
     def take_troubles(self) -> list[str]:
         """Return what went wrong since this was last asked, a sentence each."""
-        clipped = self._simulated.take_clipped_steps()
-        troubles = []
-        if clipped:
-            troubles.append(f'effort clipped by the saturation in {clipped} steps')
-        if self._skipped:
-            troubles.append(
-                f'{self._skipped:.3f} s skipped to keep up with the clock: the arm stood still, '
-                'its command went on'
-            )
-        if self._set_back:
-            troubles.append(
-                f'the clock was set back by {self._set_back:.3f} s: the arm kept its state, its '
-                'command was dropped'
-            )
-        if self._lost:
-            troubles.append(
-                f'the simulated time is {self._lost:.3f} s behind its real_time_factor: this '
-                'machine is too slow or busy'
-            )
-        self._skipped = self._lost = self._set_back = 0.0
-        return troubles
+        troubles, self._troubles = self._troubles, Troubles()
+        return troubles.sentences(self._simulated)
 
     def _advance(self, until: float) -> list[ArmState]:
         """Integrate in whole steps to an own time of the arm [s]; return the samples passed."""
@@ -304,6 +266,8 @@ class PacedArm:
             samples.append(self._sample())
             self._sampled += 1
         self._simulated.advance(target * self._simulated.step)
+        if self._simulated.take_expired():
+            self._troubles.broken = self._settings.input_timeout
         return samples
 
     def _sample(self) -> ArmState:
@@ -317,17 +281,40 @@ class PacedArm:
         self._simulated.command(shifted, self._simulated.time)
         self._profile = profile
 
+    def _refuse_jump(self, profile: EffortProfile, now: float) -> None:
+        """Refuse a command that asks the arm to be elsewhere than it is or has been sent."""
+        if profile.positions is None:
+            return
+        wanted, arm = profile.reference(now).position, self._simulated.position[:-1]
+        distances = [np.abs(wanted - arm)]
+        running = self._profile
+        if running is not None and running.positions is not None and now < running.end:
+            # A command that continues the running one does so from where that one is by now,
+            # however far from there efforts alone have brought the arm.
+            distances.append(np.abs(wanted - running.reference(now).position))
+        tolerance = self._settings.start_tolerance
+        if min(distance.max() for distance in distances) <= tolerance:
+            return
+        joint = int(np.argmax(distances[0]))
+        raise InvalidCommand(
+            f'joint {joint + 1} should be at {wanted[joint]:.4g} rad by now, but is at '
+            f'{arm[joint]:.4g} rad, {distances[0][joint]:.3g} rad away, more than the tolerance '
+            f'{tolerance:g} rad'
+        )
+
     def _drop(self) -> None:
         """Apply nothing any more."""
-        self.hold([0.0] * (self._settings.arm.n - 1))
+        self._simulated.release()
+        self._profile = None
 
     def _skip(self, lag: float) -> None:
         """Let a time [s] pass without the arm."""
         self._offset += lag
-        self._skipped += lag
-        if self._profile is None:
+        self._troubles.skipped += lag
+        profile = self._profile
+        if profile is not None and self.time < profile.start:
+            self._play(profile)  # at the same time outside, another one inside
             return
-        try:
-            self._play(self._profile)
-        except InvalidCommand:  # it has ended meanwhile
-            self._drop()
+        if profile is not None and self.time - lag < profile.end:
+            self._troubles.has_dropped = True
+        self._drop()

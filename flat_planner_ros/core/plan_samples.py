@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.flatness import apply_row, FlatMap
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 FLAT_ORDERS = 6
-"""Derivatives of the flat output in a plan, the value included."""
+"""Derivatives of the flat outputs in a plan, the values included."""
 
 JOINT_ORDERS = 3
 """Position, velocity and acceleration."""
@@ -26,18 +27,22 @@ class PlanSamples:
     times
         From the start of the motion, shape (m,) [s].
     planned
-        Derivatives 0 to 6 of the planned variable w, shape (7, m) [rad/s^k].
+        Derivatives 0 to 6 of the planned variables w, shape (n - 1, 7, m) [rad/s^k].
     torque
-        Feed-forward effort of joint n-1, the last with a motor, shape (m,) [N m].
-    flat_map
+        Effort of joint n-1, the last with a motor, without friction, shape (m,) [N m].
+    arm, flat_map
         From these to everything below.
+    compensates_friction
+        Whether the efforts include what friction takes.
 
     """
 
     times: FloatArray
     planned: FloatArray
     torque: FloatArray
+    arm: PlanarArm
     flat_map: FlatMap
+    compensates_friction: bool = False
 
     def __post_init__(self) -> None:
         """Lock the tables."""
@@ -62,26 +67,43 @@ class PlanSamples:
 
     @cached_property
     def efforts(self) -> FloatArray:
-        """Feed-forward effort of all joints, zero for the passive one, shape (m, n) [N m]."""
-        efforts = np.zeros((len(self.times), 2))
-        efforts[:, 0] = self.torque
+        """
+        Feed-forward effort of all joints, zero for the passive one, shape (m, n) [N m].
+
+        Joint n-1 follows from the flat map ((13) of docs/derivation.md), those before it from the
+        inverse dynamics of the arm.
+        """
+        n = self.arm.n
+        efforts = np.zeros((len(self.times), n))
+        efforts[:, n - 2] = self.torque
+        if n > 2:
+            efforts[:, : n - 2] = self.arm.rigid_effort(*self._joints)[:, : n - 2]
+        if self.compensates_friction:
+            efforts[:, :-1] += self.arm.friction(self.velocities)
         efforts.setflags(write=False)
         return efforts
 
     @cached_property
     def flat(self) -> FloatArray:
         """Derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k]."""
-        flat = _derivatives(self.flat_map.output, self.planned, FLAT_ORDERS)[None]
+        flat = _derivatives(self.flat_map.output, self.planned[0], FLAT_ORDERS)[None]
+        if len(self.planned) > 1:
+            flat = np.concatenate([flat, self.planned[1:, :FLAT_ORDERS]])
         flat.setflags(write=False)
         return flat
 
     @cached_property
     def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return positions, velocities and accelerations."""
-        passive = _derivatives(self.flat_map.deflection, self.planned, JOINT_ORDERS)
-        joints = np.empty((JOINT_ORDERS, len(self.times), 2))
-        np.subtract(self.flat[0, :JOINT_ORDERS], passive, out=joints[:, :, 0])
-        joints[:, :, 1] = passive
+        n = self.arm.n
+        passive = _derivatives(self.flat_map.deflection, self.planned[0], JOINT_ORDERS)
+        joints = np.empty((JOINT_ORDERS, len(self.times), n))
+        # y1 is the angle of the last link, the sum of all joints'.
+        inner = np.subtract(self.flat[0, :JOINT_ORDERS], passive, out=joints[:, :, n - 2])
+        for i in range(n - 2):
+            joints[:, :, i] = self.planned[1 + i, :JOINT_ORDERS]
+            inner -= joints[:, :, i]
+        joints[:, :, n - 1] = passive
         joints.setflags(write=False)
         positions, velocities, accelerations = joints
         return positions, velocities, accelerations

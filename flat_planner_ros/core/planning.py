@@ -1,23 +1,23 @@
-"""Plan: a goal turned into a certified motion law, joint motion and feed-forward effort."""
+"""Plan: a goal turned into certified motion laws, joint motion and feed-forward effort."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, inf
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import QuadraticCost
+from flat_planner_ros.core.course import Course, FreeCourse, Law, RestToRest
 from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.flatness import apply_row, FlatMap
-from flat_planner_ros.core.motion_law import MotionLaw
+from flat_planner_ros.core.moving_start import laws_to_rest
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.request import MotionRequest, PlanningOptions
-from flat_planner_ros.core.solutions import CONDITIONS
+from flat_planner_ros.core.request import MotionRequest, PlanningOptions, ViaPoint
 from flat_planner_ros.core.task import fractions, Task, task_of
-from flat_planner_ros.core.unit_motion import Mean
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ['MotionRequest', 'Plan', 'plan', 'PlanningOptions', 'PlanSamples']
+__all__ = ['Law', 'MotionRequest', 'Plan', 'plan', 'PlanningOptions', 'PlanSamples', 'ViaPoint']
 
 FloatArray = NDArray[np.float64]
 
@@ -37,16 +37,16 @@ NO_DISTANCE = 1e-100
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
     """
-    A motion from rest to rest and the proof of its quality.
+    A motion to rest and the proof of its quality.
 
     Attributes
     ----------
     request, options
         What was asked for.
     task
-        The same motion over 1 rad.
-    distance
-        From start to end [rad].
+        What plans of the same arm, cost and duration share.
+    course
+        The planned variables over time.
     boundary_residual
         Largest miss at the ends, relative to each derivative's peak [-].
     optimality_residual
@@ -57,9 +57,14 @@ class Plan:
     request: MotionRequest
     options: PlanningOptions
     task: Task
-    distance: float
+    course: Course
     boundary_residual: float
     optimality_residual: float
+
+    @property
+    def duration(self) -> float:
+        """Return the length of the motion [s]."""
+        return self.request.duration
 
     @property
     def cost(self) -> QuadraticCost:
@@ -68,13 +73,35 @@ class Plan:
 
     @property
     def cost_value(self) -> float:
-        """Integral of Y^T Q Y over the motion."""
-        return self.distance**2 * self.task.cost_value
+        """Integral of Y^T Q Y over the motion, summed over the planned variables."""
+        return self.course.cost_value
 
     @property
     def flat_map(self) -> FlatMap:
-        """From the planned variable to the joints."""
+        """From the first planned variable to the last two joints."""
         return self.task.flat_map
+
+    @property
+    def laws(self) -> tuple[Law, ...]:
+        """The planned variables over time, n - 1 of them."""
+        return self.course.laws
+
+    def jets(self, times: FloatArray) -> FloatArray:
+        """
+        Return the derivatives 0 to 6 of the planned variables.
+
+        Parameters
+        ----------
+        times
+            From the start of the motion, clipped to it, shape (m,) [s].
+
+        Returns
+        -------
+        FloatArray
+            Shape (n - 1, 7, m) [rad/s^k].
+
+        """
+        return self.course.jets(times)
 
     def sample(self, period: float) -> PlanSamples:
         """
@@ -86,16 +113,9 @@ class Plan:
             Largest spacing [s].
 
         """
-        duration = self.request.duration
-        intervals = max(1, ceil(duration / period - SPACING_TOLERANCE))
-        table = self.distance * self.task.grid(intervals)
-        start, end = self._ends
-        table[0] += 0.5 * (start + end)
-        table[0, 0], table[0, -1] = start, end
-        times = duration * fractions(intervals)
-        return PlanSamples(
-            times=times, planned=table[:-1], torque=table[-1], flat_map=self.task.flat_map
-        )
+        intervals = max(1, ceil(self.duration / period - SPACING_TOLERANCE))
+        planned, torque = self.course.on_even_grid(intervals)
+        return self._samples(self.duration * fractions(intervals), planned, torque)
 
     def at(self, times: FloatArray) -> PlanSamples:
         """
@@ -107,69 +127,84 @@ class Plan:
             From the start of the motion, clipped to it, shape (m,) [s].
 
         """
-        duration = self.request.duration
-        clipped = np.clip(times, 0.0, duration)
-        rate = 2.0 / duration
-        planned = self.task.unit.jet(rate * clipped, rate * (duration - clipped))
-        planned *= (self.distance * self.task.rates)[:, None]
-        planned[0] += 0.5 * sum(self._ends)
-        # The certified ends take their exact values: an executor compares them with zero.
-        for reached, end in zip((clipped <= 0.0, clipped >= duration), self._ends, strict=True):
-            planned[:CONDITIONS, reached] = 0.0
-            planned[0, reached] = end
-        return PlanSamples(
-            times=np.array(times),
-            planned=planned,
-            torque=apply_row(self.flat_map.effort, planned),
-            flat_map=self.flat_map,
-        )
-
-    @cached_property
-    def law(self) -> MotionLaw:
-        """The planned variable w over time."""
-        return MotionLaw(
-            duration=self.request.duration,
-            modes=self.task.unit.law.modes,
-            factor=self.distance,
-            offset=0.5 * sum(self._ends),
-        )
+        planned = self.jets(times)
+        torque = apply_row(self.flat_map.effort, planned[0])
+        return self._samples(np.array(times), planned, torque)
 
     @property
     def rms_effort(self) -> FloatArray:
         """Root mean square of every joint's effort over the motion, shape (n,) [N m]."""
-        return np.append(np.sqrt(self._means[0][0]), 0.0)
+        return self._figures.rms_effort.copy()
 
     @property
     def peak_effort(self) -> FloatArray:
         """Largest magnitude of every joint's effort, shape (n,) [N m]."""
-        return np.append(self._means[1][0], 0.0)
+        return self._figures.peak_effort.copy()
 
     @property
     def peak_velocity(self) -> FloatArray:
         """Largest magnitude of every joint's velocity, shape (n,) [rad/s]."""
-        return self._means[1][1:].copy()
+        return self._figures.peak_velocity.copy()
 
     @cached_property
-    def _means(self) -> Mean:
-        """Return mean squares and peaks of the torque and of the velocities of both joints."""
-        return self.task.unit.mean(self.distance * self.task.rows)
+    def _figures(self) -> '_Figures':
+        """
+        Return RMS values and peaks.
 
-    @cached_property
-    def _ends(self) -> tuple[float, float]:
-        """Return the planned variable at start and end."""
-        return _planned(self.request.start), _planned(self.request.final)
+        The nodes of the quadrature resolve every mode: RMS values are good to 1e-9 of themselves,
+        peaks are those at the nodes, within 2e-3 of the true ones from below.
+        """
+        course = self.course
+        if (
+            isinstance(course, RestToRest)
+            and len(course.distances) == 1
+            and not self.options.compensate_friction
+        ):
+            # Linear in the unit motion, whose values at the nodes are known.
+            mean = self.task.unit.mean(course.distances[0] * self.task.rows)
+            return _Figures(
+                np.append(np.sqrt(mean.mean_square[0]), 0.0),
+                np.append(mean.peak[0], 0.0),
+                mean.peak[1:],
+            )
+        times, weights = course.quadrature()
+        samples = self.at(times)
+        return _Figures(
+            np.sqrt(weights @ samples.efforts**2),
+            np.abs(samples.efforts).max(axis=0),
+            np.abs(samples.velocities).max(axis=0),
+        )
+
+    def _samples(self, times: FloatArray, planned: FloatArray, torque: FloatArray) -> PlanSamples:
+        """Return samples of this plan."""
+        return PlanSamples(
+            times=times,
+            planned=planned,
+            torque=torque,
+            arm=self.task.arm,
+            flat_map=self.task.flat_map,
+            compensates_friction=self.options.compensate_friction,
+        )
+
+
+class _Figures(NamedTuple):
+    """RMS and peak of every joint's effort [N m], peak of its velocity [rad/s], shape (n,)."""
+
+    rms_effort: FloatArray
+    peak_effort: FloatArray
+    peak_velocity: FloatArray
 
 
 def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Plan:
     """
-    Return the optimal motion from rest to rest.
+    Return the optimal motion to rest.
 
     Parameters
     ----------
     request
         Where from, where to, how long.
     arm
-        Nominal model; must be flat and have two joints.
+        Nominal model; must be flat.
     options
         Strategy, weights and flat model.
 
@@ -186,43 +221,79 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
 
     """
     _check_fit(request, arm)
-    distance = _planned(request.final) - _planned(request.start)
-    if abs(distance) < NO_DISTANCE:
-        distance = 0.0
     try:
         task = task_of(arm, options, request.duration)
+        if request.via:
+            raise InvalidRequest('motions through via points are not available')
+        if request.start_jets is not None:
+            return _from_motion(request, options, task, request.start_jets)
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE) from error
-    if not abs(distance) < task.reach:
+    return _from_rest(request, options, task)
+
+
+def _from_rest(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
+    """Return a plan whose planned variables are multiples of the unit motion."""
+    start, final = _planned(request.start), _planned(request.final)
+    distances = tuple(
+        [0.0 if abs(b - a) < NO_DISTANCE else b - a for a, b in zip(start, final, strict=True)]
+    )
+    if not all([abs(distance) < task.reach for distance in distances]):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
-    boundary = task.unit.boundary_residual if distance else 0.0
-    optimality = task.unit.optimality_residual if distance else 0.0
+    moves = any(distances)
+    boundary = task.unit.boundary_residual if moves else 0.0
+    optimality = task.unit.optimality_residual if moves else 0.0
     _certify('boundary residual', boundary, BOUNDARY_TOLERANCE)
     _certify('optimality residual', optimality, OPTIMALITY_TOLERANCE)
     return Plan(
         request=request,
         options=options,
         task=task,
-        distance=distance,
+        course=RestToRest(task=task, start=start, final=final, distances=distances),
         boundary_residual=boundary,
         optimality_residual=optimality,
     )
 
 
+def _from_motion(
+    request: MotionRequest, options: PlanningOptions, task: Task, start: FloatArray
+) -> Plan:
+    """Return a plan whose planned variables have given derivatives at the start."""
+    final = np.array(_planned(request.final))
+    with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
+        found = laws_to_rest(task, start, final)
+    _certify('boundary residual', found.boundary_residual, BOUNDARY_TOLERANCE)
+    _certify('optimality residual', found.optimality_residual, OPTIMALITY_TOLERANCE)
+    return Plan(
+        request=request,
+        options=options,
+        task=task,
+        course=FreeCourse(
+            task=task, laws=found.laws, start=start, final=final, edges=(0.0, task.duration)
+        ),
+        boundary_residual=found.boundary_residual,
+        optimality_residual=found.optimality_residual,
+    )
+
+
 def _check_fit(request: MotionRequest, arm: PlanarArm) -> None:
     """Refuse a request that the arm cannot answer."""
-    if arm.n != 2 or len(request.start) != arm.n:
+    if len(request.start) != arm.n:
         raise InvalidRequest(
-            f'planning needs two joints, the arm has {arm.n} and the request {len(request.start)}'
+            f'the arm has {arm.n} joints, the request {len(request.start)} angles'
         )
-    for name, angles in (('start', request.start), ('final', request.final)):
+    ends = [('final', request.final)]
+    if request.start_jets is None:
+        ends.insert(0, ('start', request.start))
+    for name, angles in ends:
         if angles[-1] != 0.0:
             raise InvalidRequest(f'{name} angle of the elastic joint is {angles[-1]:g} rad, not 0')
 
 
-def _planned(angles: FloatArray) -> float:
-    """Return the planned variable of an arm at rest: the absolute angle of its last link."""
-    return float(sum(angles.tolist()))
+def _planned(angles: FloatArray) -> tuple[float, ...]:
+    """Return the planned variables of an arm at rest: the last link's angle, q_1 ... q_(n-2)."""
+    joints = angles.tolist()
+    return (float(sum(joints)), *joints[:-2])
 
 
 def _certify(quantity: str, residual: float, tolerance: float) -> None:

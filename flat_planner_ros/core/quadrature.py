@@ -1,6 +1,8 @@
 """Quadrature over a motion: nodes that resolve boundary layers and oscillations of a law."""
 
+from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 from math import ceil, log2
 
 from flat_planner_ros.core.motion_law import MotionLaw
@@ -8,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 NODES_PER_PANEL = 16
 """Gauss-Legendre nodes on each panel."""
@@ -35,7 +38,45 @@ def half_quadrature(law: MotionLaw) -> tuple[FloatArray, FloatArray]:
         Normalised times x + 1 in (0, 1), and weights whose sum is 1, shape (m,) [-].
 
     """
-    rates = np.array([mode.rate for mode in law.modes])
+    return _half_nodes(np.array([mode.rate for mode in law.modes]))
+
+
+def motion_quadrature(
+    rates: ComplexArray, travel: float, edges: Sequence[float]
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return Gauss-Legendre nodes and weights over a motion of several pieces.
+
+    Parameters
+    ----------
+    rates
+        Characteristic roots of its laws, in units of 2 / duration, shape (m,) [-].
+    travel
+        Distance that the joints cover: dynamics turn with it [rad].
+    edges
+        Times from start to end between which the laws are smooth [s].
+
+    Returns
+    -------
+    tuple[FloatArray, FloatArray]
+        Times [s], and weights whose sum is 1, shape (m,).
+
+    """
+    # A motion's peak velocity is about twice the mean one.
+    rates = np.append(rates, 2j * travel)
+    begin, duration = edges[0], edges[-1] - edges[0]
+    times, weights = [], []
+    for start, end in pairwise(edges):
+        share = (end - start) / duration
+        nodes, halves = _half_nodes(share * rates)
+        reach = 0.5 * (end - start) * nodes
+        times += [start + reach - begin, end - reach - begin]
+        weights += 2 * [0.5 * share * halves]
+    return np.concatenate(times), np.concatenate(weights)
+
+
+def _half_nodes(rates: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights over the first half, for given roots, as `half_quadrature`."""
     depth = ceil(log2(np.abs(rates).max() + 1.0)) + 1
     # Halved towards the start as deep as layers go, even where the law is slow.
     layers = 0.5 ** np.arange(depth, 0.0, -1.0)

@@ -8,7 +8,14 @@ from math import floor, inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.effort_profile import EffortProfile, JointReference, locked
+from flat_planner_ros.core.effort_profile import (
+    check_bound,
+    EffortProfile,
+    JointReference,
+    locked,
+    MAX_EFFORT,
+    MAX_VELOCITY,
+)
 from flat_planner_ros.core.errors import InvalidCommand, InvalidModel
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +24,13 @@ Array = npt.NDArray[np.float64]
 
 GRID_TOLERANCE = 1e-6
 """A grid time ahead of the present by less counts as reached, relative to the step [-]."""
+
+MAX_SPEED = 10 * MAX_VELOCITY
+"""
+Joint velocity beyond which an arm is stopped [rad/s].
+
+Efforts, gains or an integration step without sense get there, and would go on to infinity.
+"""
 
 
 class ArmState(NamedTuple):
@@ -40,29 +54,12 @@ class ArmState(NamedTuple):
     effort: Array
 
 
-class Rollout(NamedTuple):
-    """
-    States on a time grid.
-
-    Attributes
-    ----------
-    times
-        Shape (m,) [s].
-    positions, velocities
-        Shape (m, n) [rad], [rad/s].
-
-    """
-
-    times: Array
-    positions: Array
-    velocities: Array
-
-
 class SimulatedArm:
     """
     The true arm: its full dynamics, integrated in fixed Runge-Kutta steps of fourth order.
 
-    Time lies on a grid: the start plus a whole number of steps, so that it never drifts.
+    Time lies on a grid: the start plus a whole number of steps, so that it never drifts. An arm
+    that runs away, beyond MAX_SPEED, is stopped where it is until it is reset.
 
     Parameters
     ----------
@@ -113,7 +110,7 @@ class SimulatedArm:
         self._missing = np.full(arm.n - 1, np.nan)
         self._clipped_steps, self._is_clipped = 0, False
         self._profile: EffortProfile | None = None
-        self._held: Array = np.zeros(arm.n - 1)
+        self._nothing: Array = np.zeros(arm.n - 1)
         self.reset(np.zeros(arm.n) if position is None else position)
 
     @property
@@ -159,6 +156,11 @@ class SimulatedArm:
         """Return time, position, velocity and applied effort."""
         return ArmState(self.time, self.position, self.velocity, self.applied_effort)
 
+    @property
+    def fault(self) -> str:
+        """Return why the arm has been stopped and what it did, nothing while it has not."""
+        return self._fault
+
     def take_clipped_steps(self) -> int:
         """Return how many steps had an effort clipped since this was last asked."""
         count, self._clipped_steps = self._clipped_steps, 0
@@ -179,9 +181,11 @@ class SimulatedArm:
         Raises
         ------
         InvalidCommand
-            If it has ended already or does not suit the arm. The present command then goes on.
+            If it has ended already or does not suit the arm, or if the arm has been stopped. The
+            present command then goes on.
 
         """
+        self._refuse_if_stopped()
         motors = self._arm.n - 1
         if profile.motors != motors:
             raise InvalidCommand(f'the arm has {motors} motors, the command {profile.motors}')
@@ -193,12 +197,42 @@ class SimulatedArm:
             raise InvalidCommand('feedback needs a command with positions')
         self._profile = profile.taken_over(now, self._reference(now).effort)
 
-    def hold(self, effort: npt.ArrayLike) -> None:
-        """Apply a constant effort, shape (n-1,) [N m], until the next command, open loop."""
+    def hold(self, effort: npt.ArrayLike, until: float = inf) -> None:
+        """
+        Apply a constant effort, open loop, in the place of the present command.
+
+        Parameters
+        ----------
+        effort
+            Shape (n-1,) [N m].
+        until
+            Absolute time from which nothing is applied any more [s].
+
+        Raises
+        ------
+        InvalidCommand
+            If it does not suit the arm, or if the arm has been stopped. What is applied at
+            present then goes on.
+
+        """
+        self._refuse_if_stopped()
         held = locked('effort', effort, 'N m')
         if held.shape != (self._arm.n - 1,):
             raise InvalidCommand(f'effort must have {self._arm.n - 1} entries, got {held.shape}')
-        self._profile, self._held = None, held
+        check_bound('effort', held, MAX_EFFORT, 'N m')
+        self._profile, self._held, self._held_until = None, held, until
+
+    def release(self) -> None:
+        """Apply nothing until the next command."""
+        self._profile, self._held, self._held_until = None, self._nothing, inf
+
+    def take_expired(self) -> bool:
+        """Return whether a held effort other than zero has ended, and forget that it has."""
+        if self.time < self._held_until - GRID_TOLERANCE * self._step:
+            return False
+        was_applied = bool(self._held.any())
+        self.release()
+        return was_applied
 
     def reset(self, position: npt.ArrayLike) -> None:
         """Rest at joint angles (n,) [rad] without a command; time goes on."""
@@ -206,7 +240,8 @@ class SimulatedArm:
         if angles.shape != (self._arm.n,) or not np.isfinite(angles).all():
             raise InvalidModel(f'position must be {self._arm.n} finite rad, got {angles}')
         self._position, self._velocity = angles, np.zeros(self._arm.n)
-        self._profile, self._held = None, np.zeros(self._arm.n - 1)
+        self._fault = ''
+        self.release()
 
     def advance(self, until: float) -> int:
         """Integrate to the last grid time that is not after `until` [s]; return the steps."""
@@ -214,6 +249,9 @@ class SimulatedArm:
         steps = max(0, target - self._count)
         reference = self._reference(self.time)
         for _ in range(steps):
+            if self._fault:
+                self._count = target
+                break
             reference = self._advance_once(reference)
         return steps
 
@@ -231,10 +269,30 @@ class SimulatedArm:
         ddq_3 = self._acceleration(middle, q + h / 2 * dq_2, dq_3)
         ddq_4 = self._acceleration(end, q + h * dq_3, dq + h * ddq_3)
         inner = ddq_2 + ddq_3
+        velocity = dq + h / 6 * (ddq_1 + 2 * inner + ddq_4)
+        if not velocity.dot(velocity) < MAX_SPEED**2:  # nor is NaN below
+            self._stop(velocity)
+            return end
         self._position = q + h * (dq + h / 6 * (ddq_1 + inner))
-        self._velocity = dq + h / 6 * (ddq_1 + 2 * inner + ddq_4)
+        self._velocity = velocity
         self._clipped_steps += self._is_clipped
         return end
+
+    def _stop(self, velocity: Array) -> None:
+        """Stand still where the arm is, because of velocities (n,) [rad/s] without sense."""
+        worst = int(np.argmax(np.abs(velocity)))
+        self._fault = (
+            f'joint {worst + 1} would have reached {velocity[worst]:.3g} rad/s at {self.time:.3f} '
+            f's, beyond {MAX_SPEED:g} rad/s: the efforts, or the friction and gains for steps of '
+            f'{self._step:g} s, are too large'
+        )
+        self._velocity = np.zeros(self._arm.n)
+        self.release()
+
+    def _refuse_if_stopped(self) -> None:
+        """Let only a reset move an arm that has run away."""
+        if self._fault:
+            raise InvalidCommand(f'the arm has been stopped until it is reset: {self._fault}')
 
     def _acceleration(self, reference: JointReference, q: Array, dq: Array) -> Array:
         """Return joint accelerations, shape (n,) [rad/s^2]."""
@@ -247,7 +305,8 @@ class SimulatedArm:
     def _reference(self, t: float) -> JointReference:
         """Return what is commanded at an absolute time [s]."""
         if self._profile is None:
-            return JointReference(self._held, self._missing, self._missing)
+            held = self._held if t < self._held_until else self._nothing
+            return JointReference(held, self._missing, self._missing)
         if self._has_feedback:
             return self._profile.reference(t)
         return JointReference(self._profile.effort(t), self._missing, self._missing)
@@ -277,45 +336,3 @@ class SimulatedArm:
         if not (array >= 0.0).all():
             raise InvalidModel(f'{name} must be at least 0 {unit}, got {array}')
         return array
-
-
-def rollout(
-    arm: PlanarArm,
-    profile: EffortProfile,
-    until: float,
-    *,
-    step: float = 1e-3,
-    position: npt.ArrayLike | None = None,
-    saturation: npt.ArrayLike | None = None,
-    feedback_p: npt.ArrayLike | None = None,
-    feedback_d: npt.ArrayLike | None = None,
-) -> Rollout:
-    """
-    Return the motion of an arm, at rest when the profile starts, at every step.
-
-    Parameters
-    ----------
-    arm, profile
-        What is moved and by what.
-    until
-        Absolute time of the end [s].
-    step, position, saturation, feedback_p, feedback_d
-        As in SimulatedArm.
-
-    """
-    simulated = SimulatedArm(
-        arm,
-        position=position,
-        time=profile.start,
-        step=step,
-        saturation=saturation,
-        feedback_p=feedback_p,
-        feedback_d=feedback_d,
-    )
-    simulated.command(profile, profile.start)
-    times, positions, velocities = [simulated.time], [simulated.position], [simulated.velocity]
-    while simulated.advance(min(until, simulated.time + step)):
-        times.append(simulated.time)
-        positions.append(simulated.position)
-        velocities.append(simulated.velocity)
-    return Rollout(np.array(times), np.array(positions), np.array(velocities))

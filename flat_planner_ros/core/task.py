@@ -37,6 +37,10 @@ class Task:
 
     Attributes
     ----------
+    arm
+        What moves.
+    duration
+        Length of the motion [s].
     cost
         What is minimised.
     flat_map
@@ -52,6 +56,8 @@ class Task:
 
     """
 
+    arm: PlanarArm
+    duration: float
     cost: QuadraticCost
     flat_map: FlatMap
     unit: UnitMotion
@@ -59,9 +65,14 @@ class Task:
     cost_value: float
     reach: float
 
+    @property
+    def rates_of_modes(self) -> NDArray[np.complex128]:
+        """Return the characteristic roots that the unit motion is made of, (m,) [2 / duration]."""
+        return np.array([mode.rate for mode in self.unit.law.modes])
+
     @cached_property
     def rows(self) -> FloatArray:
-        """Torque and velocities of both joints from the unit motion's derivatives, (3, 7)."""
+        """Torque and velocities of the last two joints from the unit motion's jet, (3, 7)."""
         mapping = self.flat_map
         rows = np.zeros((3, JET_ORDER + 1))
         rows[0, : len(mapping.effort)] = mapping.effort
@@ -104,7 +115,14 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
     reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5)
     return Task(
-        cost=cost, flat_map=mapping, unit=unit, rates=rates, cost_value=cost_value, reach=reach
+        arm=arm,
+        duration=duration,
+        cost=cost,
+        flat_map=mapping,
+        unit=unit,
+        rates=rates,
+        cost_value=cost_value,
+        reach=reach,
     )
 
 

@@ -146,7 +146,7 @@ def unit_motion(key: bytes) -> UnitMotion:
     coefficients = np.frombuffer(key)
     ends = 0.5 * np.eye(CONDITIONS)[0]
     law = extremal(coefficients, 2.0, Jets(start=-ends, end=ends))
-    times = _probes()
+    times = probes()
     jet = law.terms.at(times, 2.0 - times, 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     miss = np.maximum(np.abs(jet[:CONDITIONS, 0] + ends), np.abs(jet[:CONDITIONS, -1] - ends))
@@ -162,11 +162,11 @@ def unit_motion(key: bytes) -> UnitMotion:
 
 
 @cache
-def _probes() -> FloatArray:
+def probes() -> FloatArray:
     """
     Return normalised times that crowd towards the start as fast as boundary layers can.
 
-    The law is odd: one half is enough. The last two are the middle and the end.
+    Those from 0 to 1, of which one half of a motion has enough, and last the end, 2.
     """
     layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
     times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))

@@ -199,10 +199,19 @@ def profile_from_trajectory(
         efforts = _table(msg, 'effort')
         positions = _optional_table(msg, 'positions')
         velocities = _optional_table(msg, 'velocities')
+        accelerations = _optional_table(msg, 'accelerations')
     except InvalidRequest as error:
         raise InvalidCommand(str(error)) from error
     if joints[-1] in names and efforts[:, names.index(joints[-1])].any():
         raise InvalidCommand(f'the passive joint {joints[-1]} cannot be given an effort')
+    # What is not played is a part of the command all the same: with it, all of it is broken.
+    for field, table in {
+        'positions': positions,
+        'velocities': velocities,
+        'accelerations': accelerations,
+    }.items():
+        if table is not None and not np.isfinite(table).all():
+            raise InvalidCommand(f'{field} must be finite')
     actuated = select(names, joints[:-1])
     stamp = _stamp(msg)
     return EffortProfile(

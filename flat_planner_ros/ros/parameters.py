@@ -270,10 +270,6 @@ def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
         raise InvalidParameter(
             'joints must name the joints in kinematic order, e.g. joints: [joint1, joint2]'
         )
-    if len(joints) > 2:
-        raise InvalidParameter(
-            f'arms with {len(joints)} joints are not available in this version, only 2'
-        )
     common = {name: _required(values, f'model.{name}') for name in ('stiffness', 'damping')}
     common['gravity'] = values.get('model.gravity', 0.0)
     for kind in ('viscous', 'coulomb'):

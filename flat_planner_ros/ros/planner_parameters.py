@@ -79,6 +79,11 @@ ROWS = [
         choices=tuple(model.value for model in FlatModel),
     ),
     Row(
+        name='compensate_friction',
+        default=False,
+        description='add to the efforts what friction.viscous and friction.coulomb take',
+    ),
+    Row(
         name='duration.default',
         default=0.0,
         description='duration of goals without times [s]; 0 = automatic, not yet available',
@@ -213,6 +218,7 @@ def build(values: Values) -> PlannerSettings:
         p=values['weights.p'],
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
+        compensate_friction=values['compensate_friction'],
     )
     # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
     strategy_cost(

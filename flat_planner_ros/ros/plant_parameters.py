@@ -91,6 +91,20 @@ ROWS = [
         choices=tuple(choice.value for choice in CommandInput),
         read_only=True,
     ),
+    Row(
+        name='input_timeout',
+        default=SimulationSettings.input_timeout,
+        description='silence after which a stream of efforts has broken: no effort from then [s]',
+        lower=1e-3,
+        upper=10.0,
+    ),
+    Row(
+        name='start_tolerance',
+        default=SimulationSettings.start_tolerance,
+        description='largest distance of a command from where the arm is [rad]',
+        lower=0.0,
+        infinite=True,
+    ),
     *(
         Row(
             name=f'mismatch.{quantity}_scale',
@@ -178,6 +192,8 @@ def build(values: Values) -> PlantSettings:
             seed=values['noise.seed'],
             resolution=values['encoder.resolution'],
         ),
+        start_tolerance=values['start_tolerance'],
+        input_timeout=values['input_timeout'],
     )
     return PlantSettings(
         joints=joints,

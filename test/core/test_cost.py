@@ -3,7 +3,7 @@
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.errors import InvalidCost
-from flat_planner_ros.core.flatness import flat_map
+from flat_planner_ros.core.flatness import flat_map, FlatModel
 import numpy as np
 from numpy.polynomial import Polynomial
 import pytest
@@ -131,7 +131,9 @@ def test_min_control_effort_has_the_papers_entries():
         expected[1, 4] = expected[4, 1] = -weight * c * i1 * i2 * difference / k**2
         expected[3, 4] = expected[4, 3] = -weight * c * i2**2 * difference**2 / k**3
         expected[5, 5] = 1.0
-        cost = strategy_cost(Strategy.MIN_CONTROL_EFFORT, flat_map(arm), r=r, p=3.0)
+        cost = strategy_cost(
+            Strategy.MIN_CONTROL_EFFORT, flat_map(arm, FlatModel.APPROXIMATE), r=r, p=3.0
+        )
         np.testing.assert_allclose(cost.matrix, expected, rtol=1e-13, atol=0.0)
 
 
@@ -152,7 +154,7 @@ def test_cost_density_is_jerk_effort_and_energy():
         tau = i1 * y[2] + i2 * (i1 - i2) / k * (y[4] - c / k * y[5])
         for strategy, (has_effort, has_energy) in weights.items():
             terms = [y[6] ** 2, has_effort * r**8 * tau**2, has_energy * p**8 * y[2] ** 2]
-            matrix = strategy_cost(strategy, flat_map(arm), r=r, p=p).matrix
+            matrix = strategy_cost(strategy, flat_map(arm, FlatModel.APPROXIMATE), r=r, p=p).matrix
             scale = np.abs(y[1:]) @ np.abs(matrix) @ np.abs(y[1:])
             assert abs(y[1:] @ matrix @ y[1:] - sum(terms)) <= 1e-13 * scale
             checked += 1
@@ -161,18 +163,24 @@ def test_cost_density_is_jerk_effort_and_energy():
 
 def test_min_potential_energy_equation_has_a_plus_sign(paper_arm):
     """y^(12) + p^8 y^(4) = 0: eq:odeminpot, whose printed sign contradicts eq:ode."""
-    cost = strategy_cost(Strategy.MIN_POTENTIAL_ENERGY, flat_map(paper_arm), r=9.0, p=17.0)
+    cost = strategy_cost(
+        Strategy.MIN_POTENTIAL_ENERGY, flat_map(paper_arm, FlatModel.APPROXIMATE), r=9.0, p=17.0
+    )
     np.testing.assert_array_equal(cost.characteristic(), [0, 0, 17.0**8, 0, 0, 0, 1])
 
 
 def test_polynomial_equation_has_one_term(paper_arm):
-    cost = strategy_cost(Strategy.POLYNOMIAL, flat_map(paper_arm), r=9.0, p=17.0)
+    cost = strategy_cost(
+        Strategy.POLYNOMIAL, flat_map(paper_arm, FlatModel.APPROXIMATE), r=9.0, p=17.0
+    )
     np.testing.assert_array_equal(cost.characteristic(), [0, 0, 0, 0, 0, 0, 1])
 
 
 def test_custom_cost_is_kept_as_a_locked_copy(paper_arm):
     matrix = random_matrix(np.random.default_rng(7))
-    cost = strategy_cost(Strategy.CUSTOM, flat_map(paper_arm), custom=matrix)
+    cost = strategy_cost(
+        Strategy.CUSTOM, flat_map(paper_arm, FlatModel.APPROXIMATE), custom=matrix
+    )
     np.testing.assert_array_equal(cost.matrix, matrix)
     before = matrix[0, 0]
     matrix[0, 0] = -1.0
@@ -247,17 +255,19 @@ def scaled(matrix, units):
 @pytest.mark.parametrize('name', ['r', 'p'])
 @pytest.mark.parametrize('value', [-1e-9, MAX_WEIGHT * (1.0 + 1e-12), np.nan, np.inf])
 def test_refuses_a_weight_out_of_range(paper_arm, name, value):
-    mapping = flat_map(paper_arm)
+    mapping = flat_map(paper_arm, FlatModel.APPROXIMATE)
     with pytest.raises(InvalidCost, match=rf'weight {name} = {value:g} is outside \[0, 1000\]'):
         strategy_cost(Strategy.MIXED, mapping, **{name: value})
 
 
 @pytest.mark.parametrize('value', [0.0, MAX_WEIGHT])
 def test_accepts_the_ends_of_the_range(paper_arm, value):
-    cost = strategy_cost(Strategy.MIXED, flat_map(paper_arm), r=value, p=value)
+    cost = strategy_cost(
+        Strategy.MIXED, flat_map(paper_arm, FlatModel.APPROXIMATE), r=value, p=value
+    )
     assert np.isfinite(cost.characteristic()).all()
 
 
 def test_custom_needs_its_matrix(paper_arm):
     with pytest.raises(InvalidCost, match=r'weights\.Q'):
-        strategy_cost(Strategy.CUSTOM, flat_map(paper_arm))
+        strategy_cost(Strategy.CUSTOM, flat_map(paper_arm, FlatModel.APPROXIMATE))

@@ -8,7 +8,7 @@ from flat_planner_ros.core.extremal import (
     extremal,
     Jets,
 )
-from flat_planner_ros.core.flatness import flat_map
+from flat_planner_ros.core.flatness import flat_map, FlatModel
 import numpy as np
 from numpy.polynomial import legendre, Polynomial
 import pytest
@@ -42,7 +42,7 @@ def random_semidefinite(rng, rank):
 def named_matrices():
     """Return the Q of the strategies and of roots that are hard to tell apart."""
     arm = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
-    mapping = flat_map(arm)
+    mapping = flat_map(arm, FlatModel.APPROXIMATE)
     rng = np.random.default_rng(1)
     return {
         'polynomial': strategy_cost(Strategy.POLYNOMIAL, mapping).matrix,

@@ -6,6 +6,7 @@ from flat_planner_ros.core.flatness import apply_row, flat_map, FlatModel
 import numpy as np
 import pytest
 
+PAPER = FlatModel.APPROXIMATE
 CASES = 60
 SAMPLES = 41
 
@@ -38,7 +39,7 @@ def flat_arm(rng, n, damping_ratio):
     )
 
 
-def motion(arm, rng, jet, model=FlatModel.APPROXIMATE):
+def motion(arm, rng, jet, model=PAPER):
     """Return q, dq, ddq of a jet of y1; the other flat outputs move at random."""
     mapping = flat_map(arm, model)
     others = [sinusoids(rng, 3, 1.0) for _ in range(arm.n - 2)]
@@ -58,7 +59,7 @@ def test_an_undamped_arm_follows_the_map_exactly(n):
         frequency = np.sqrt(arm.stiffness / arm.inertia_star.last)
         jet = sinusoids(rng, 9, frequency)
         effort = arm.inverse_dynamics(*motion(arm, rng, jet))
-        expected = apply_row(flat_map(arm).effort, jet)
+        expected = apply_row(flat_map(arm, PAPER).effort, jet)
         scale = np.abs(effort).max()
         np.testing.assert_allclose(effort[:, -2], expected, rtol=0, atol=1e-12 * scale)
         np.testing.assert_allclose(effort[:, -1], 0.0, rtol=0, atol=1e-12 * scale)
@@ -111,7 +112,7 @@ def test_damping_leaves_an_error_of_second_order(n):
         for arm in (damped, damped.scaled(damping=0.5)):
             effort = arm.inverse_dynamics(*motion(arm, np.random.default_rng(0), jet))
             scale = np.abs(effort).max()
-            expected = apply_row(flat_map(arm).effort, jet)
+            expected = apply_row(flat_map(arm, PAPER).effort, jet)
             np.testing.assert_allclose(effort[:, -2], expected, rtol=0, atol=1e-12 * scale)
             residuals.append(effort[:, -1])
         full, half = residuals
@@ -125,7 +126,7 @@ def test_damping_leaves_an_error_of_second_order(n):
 def test_rows_have_the_papers_entries(paper_arm):
     """eq:qn and eq:tau on the paper's numbers."""
     i1, i2, k, c = 6.4e-4, 3.3e-5, 3e-3, 2e-5
-    mapping = flat_map(paper_arm)
+    mapping = flat_map(paper_arm, PAPER)
     np.testing.assert_array_equal(mapping.output, [1.0])
     np.testing.assert_allclose(mapping.deflection, [0, 0, -i2 / k, i2 * c / k**2], rtol=1e-14)
     effort = [0, 0, i1, 0, i2 * (i1 - i2) / k, -i2 * (i1 - i2) * c / k**2]
@@ -150,7 +151,7 @@ def test_apply_row_differentiates():
 
 
 def test_rows_are_locked(paper_arm):
-    mapping = flat_map(paper_arm)
+    mapping = flat_map(paper_arm, PAPER)
     for row in (mapping.output, mapping.deflection, mapping.effort):
         with pytest.raises(ValueError, match='read-only'):
             row[0] = 5.0
@@ -173,7 +174,7 @@ def test_refuses_an_unbalanced_arm(excess):
         **links, counterbalance_mass=(0.8, 0.16), counterbalance_arm=(inner, last + excess)
     )
     if excess == 0.0:
-        assert flat_map(arm).output == 1.0
+        assert flat_map(arm, PAPER).output == 1.0
         return
     with pytest.raises(NotFlat) as caught:
         flat_map(arm)

@@ -12,7 +12,7 @@ from flat_planner_ros.core.identification import (
     StiffnessEstimate,
 )
 from flat_planner_ros.core.oscillation import fit_oscillation
-from flat_planner_ros.core.simulation import EffortProfile, rollout
+from flat_planner_ros.core.rollout import EffortProfile, rollout
 import numpy as np
 import pytest
 from scipy.signal import lfilter

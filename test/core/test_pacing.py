@@ -10,10 +10,10 @@ from flat_planner_ros.core.pacing import (
     MAX_BACKWARD,
     MAX_CATCH_UP,
     PacedArm,
-    SimulationSettings,
 )
+from flat_planner_ros.core.rollout import EffortProfile, rollout
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.simulation import EffortProfile, rollout
+from flat_planner_ros.core.simulation_settings import SimulationSettings
 import numpy as np
 import pytest
 
@@ -142,11 +142,11 @@ def test_a_long_lag_is_skipped_and_told():
     assert after[-1].position == pytest.approx(
         before.position + before.velocity / SETTINGS.rate, abs=1e-4
     )
-    assert after[-1].effort[0] == pytest.approx(
-        swing(1.5, 20.0).effort(after[-1].time)[0], abs=1e-12
-    )
+    assert before.effort[0] != 0.0
+    assert {sample.effort[0] for sample in after + arm.follow(now + 1.0)} == {0.0}
     (trouble,) = arm.take_troubles()
     assert 's skipped' in trouble
+    assert 'dropped' in trouble
     assert float(trouble.split()[0]) == pytest.approx(MAX_CATCH_UP + 7.0, abs=0.006)
     assert arm.take_troubles() == []
 
@@ -157,7 +157,7 @@ def test_nothing_is_applied_after_a_command_that_ended_in_a_skipped_time():
     samples = arm.follow(60.0) + arm.follow(60.1)
     assert {sample.effort[0] for sample in samples} == {0.0}
     arm.command(swing(61.0))  # and the next command works
-    arm.follow(61.2)
+    arm.follow(60.9)
     assert arm.follow(61.5)[-1].effort[0] == pytest.approx(swing(61.0).effort(61.5)[0])
 
 
@@ -257,8 +257,130 @@ def test_a_command_that_has_ended_is_refused_and_the_present_one_goes_on():
     assert np.array_equal(last(lead_to(arm, 4.0)), last(lead_to(undisturbed, 4.0)))
 
 
-def test_a_constant_effort_is_held_until_the_next_command():
+def test_a_command_that_begins_after_a_skipped_time_is_kept():
+    arm, start = PacedArm(SETTINGS), 10.0
+    arm.follow(1.0)
+    arm.command(swing(start))
+    arm.follow(9.0)
+    assert 'dropped' not in arm.take_troubles()[0]
+    samples = arm.follow(9.9) + arm.follow(10.5)
+    assert samples[-1].effort[0] == pytest.approx(swing(start).effort(samples[-1].time)[0])
+
+
+def located(start, position, *, turn=0.3, duration=2.0):
+    """Return a command with positions that turns joint 1 from one."""
+    profile = swing(start, duration)
+    course = position + turn * (1 - np.cos(np.pi * profile.times / duration))[:, None] / 2
+    return replace(profile, positions=course)
+
+
+@pytest.mark.parametrize('start', [1.5, 2.0, 100.0])
+def test_a_command_that_starts_elsewhere_is_refused_and_not_jumped_to(start):
+    arm = PacedArm(replace(SETTINGS, position=(0.2, 0.0)), 1.5)
+    with pytest.raises(InvalidCommand, match=r'joint 1 .* at 0\.2\d* rad'):
+        arm.command(located(start, 0.2 + 1.02 * SETTINGS.start_tolerance))
+    assert {sample.effort[0] for sample in lead_to(arm, 4.0)} == {0.0}
+    arm.command(located(arm.time, 0.2 + 0.98 * SETTINGS.start_tolerance))
+    arm.command(located(arm.time, 0.2 - 0.98 * SETTINGS.start_tolerance))
+
+
+def test_the_distance_that_is_allowed_can_be_chosen():
+    arm = PacedArm(replace(SETTINGS, start_tolerance=np.inf), 1.0)
+    arm.command(located(1.0, 30.0))
+    arm.settings = replace(arm.settings, start_tolerance=0.0)
+    with pytest.raises(InvalidCommand, match='tolerance 0 rad'):
+        arm.command(located(1.0, 1e-9))
+
+
+def test_a_late_command_is_refused_once_it_should_have_come_too_far():
+    for delay, is_played in ((0.1, True), (1.0, False)):
+        arm = PacedArm(SETTINGS, 10.0)
+        if is_played:
+            assert 'after its start' in arm.command(located(10.0 - delay, 0.0))
+        else:
+            with pytest.raises(InvalidCommand, match='should be at 0.15 rad by now, but is at 0'):
+                arm.command(located(10.0 - delay, 0.0))
+
+
+def test_a_command_may_continue_the_running_one_wherever_the_arm_has_come():
+    heavy = replace(SETTINGS, arm=PAPER.scaled(inertia=20.0))
+    arm = PacedArm(heavy, 1.0)
+    first = located(1.0, 0.0, turn=3.0)
+    arm.command(first)
+    lead_to(arm, 2.0)
+    assert first.reference(2.0).position - arm._simulated.position[0] > 1.0
+    arm.command(located(1.0, 0.0, turn=3.0))
+    with pytest.raises(InvalidCommand, match='should be at'):
+        arm.command(located(1.0, 1.0, turn=3.0))
+    lead_to(arm, 3.5)  # The running one has ended: now the arm itself counts.
+    with pytest.raises(InvalidCommand, match='should be at 3 rad'):
+        arm.command(located(3.5, 3.0))
+
+
+@pytest.mark.parametrize('effort', [1e-300, 1.0, 1e6])
+def test_efforts_without_measure_stop_the_arm_in_finite_numbers(effort):
+    times, efforts = [0.0, 1.0, 1.5], [[effort], [-effort], [0.0]]
+    arm = PacedArm(SETTINGS, 1.0)
+    arm.command(EffortProfile(start=1.0, times=times, efforts=efforts))
+    samples = lead_to(arm, 3.0)
+    assert np.isfinite([np.concatenate(sample[1:]) for sample in samples]).all()
+    if effort < 1e3:
+        assert arm.take_troubles() == []
+        return
+    assert not samples[-1].velocity.any()
+    assert samples[-1].effort[0] == 0.0
+    for _ in range(2):  # said again until something is done about it
+        (trouble,) = arm.take_troubles()
+        assert 'has been stopped until it is reset: joint' in trouble
+    for act in (lambda: arm.command(swing(4.0)), lambda: arm.hold([0.0])):
+        with pytest.raises(InvalidCommand, match='stopped until it is reset'):
+            act()
+    arm.reset()
+    assert arm.take_troubles() == []
+    arm.command(swing(4.0))
+    assert lead_to(arm, 5.0)[-1].position[0] != 0.0
+
+
+def test_gains_or_friction_too_large_for_the_step_stop_the_arm_too():
+    stiff = replace(SETTINGS, feedback_p=(1e6,), feedback_d=(1e6,))
+    arm = PacedArm(stiff, 1.0)
+    arm.command(located(1.0, 1e-3))
+    assert np.isfinite([np.concatenate(s[1:]) for s in lead_to(arm, 2.0)]).all()
+    assert 'gains for steps of 0.001 s' in arm.take_troubles()[0]
+
+
+def test_a_stream_of_efforts_is_applied_as_it_comes():
+    arm = PacedArm(SETTINGS, 1.0)
+    for effort in (1e-3, -2e-3, 0.0):
+        arm.hold([effort])
+        samples = lead_to(arm, arm.time + 0.05)
+        assert {sample.effort[0] for sample in samples[1:]} == {effort}
+    lead_to(arm, 3.0)
+    assert arm.take_troubles() == []  # it ended with zeros
+
+
+def test_a_stream_that_breaks_ends_in_no_effort_and_one_complaint():
+    arm = PacedArm(replace(SETTINGS, input_timeout=0.1), 1.0)
+    arm.hold([2e-3])
+    samples = lead_to(arm, 2.0)
+    applied = [sample.time for sample in samples if sample.effort[0]]
+    assert max(applied) == pytest.approx(1.095)
+    (trouble,) = arm.take_troubles()
+    assert 'none came for 0.1 s' in trouble
+    lead_to(arm, 3.0)
+    assert arm.take_troubles() == []
+    expected = rollout(
+        PAPER,
+        EffortProfile(start=0.0, times=[0.0, 0.1, 0.1 + 1e-9], efforts=[[2e-3], [2e-3], [0.0]]),
+        1.0,
+    )
+    assert samples[-1].position == pytest.approx(expected.positions[-1], abs=2e-3)
+
+
+def test_efforts_are_held_until_the_next_command():
     arm = moving()
+    arm.hold([2e-3])
+    arm.settings = replace(SETTINGS, input_timeout=10.0)
     arm.hold([2e-3])
     samples = lead_to(arm, 3.0)
     assert {sample.effort[0] for sample in samples[1:]} == {2e-3}

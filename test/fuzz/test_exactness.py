@@ -201,7 +201,7 @@ def relative_error(oracle, case: Case, found: Plan, is_checked: bool) -> float:
             again = exact_jets(oracle, scaled, times / half)
         assert (np.abs(again - expected) <= ORACLE_TOLERANCE * peak).all()
     rates = half ** -np.arange(7.0)[:, None]
-    jet = found.law.jet(times, 6) / rates
+    jet = found.laws[0].jet(times, 6) / rates
     jet[0] -= 0.5
     samples = found.at(times)
     row = found.flat_map.effort
@@ -226,7 +226,7 @@ def certified(case: Case, found: Plan) -> tuple[float, float]:
     fractions = np.concatenate([[0.0], near, 1.0 - near[::-1], [1.0]])
     weights = np.tile((0.5 * widths * w).ravel(), (2, 1))
     weights = np.concatenate([[0.0], weights[0], weights[1, ::-1], [0.0]]) * duration
-    jet = found.law.jet(fractions * duration, 12)
+    jet = found.laws[0].jet(fractions * duration, 12)
     terms = a[1:, None] * jet[2::2]
     size = np.abs(terms).sum(axis=0).max() or 1.0  # A polynomial has no terms.
     equation = terms.sum(axis=0)

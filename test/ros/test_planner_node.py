@@ -433,7 +433,13 @@ BAD_ARGUMENTS = {
     'integer': (['-p', 'weights.r:=150'], 'weights.r must be of type double (write 1.0, not 1)'),
     'typing error': (['-p', 'weigths.r:=150.0'], 'did you mean weights.r?'),
     'half a model': (['-p', 'model.stiffness:=1.0'], 'joints'),
-    'three joints': (['-p', 'joints:=[a, b, c]'], 'only 2'),
+    'three joints': (
+        [
+            *('-p', 'joints:=[a, b, c]', '-p', 'model.inertia_star:=[6.4e-4, 3.3e-5]'),
+            *('-p', 'model.stiffness:=3.0e-3', '-p', 'model.damping:=2.0e-5'),
+        ],
+        '3 joints are named, but the model has 2',
+    ),
     'unknown choice': (['-p', 'strategy:=best'], 'one of polynomial'),
     'not available': (['-p', 'stream_effort:=true'], 'not available'),
     'range': (

@@ -273,6 +273,16 @@ UNACCEPTABLE = {
     'falling times': ({'points': points([0.0, 0.0], [0.0, 0.0], times=(0.5, 0.4))}, 'increase'),
     'negative times': ({'points': points([0.0, 0.0], [0.0, 0.0], times=(-1.0, 5.0))}, 'negative'),
     'effort at the end': ({'points': points([0.0, 0.0], [1e-3, 0.0])}, 'last effort'),
+    'short accelerations': ({'points': [point(accelerations=[0.0])]}, '1 accelerations for 2'),
+    'NaN aside': ({'points': [point(accelerations=[0.0, nan])]}, 'accelerations must be finite'),
+    'passive NaN': ({'points': [point(positions=[0.0, nan])]}, 'positions must be finite'),
+    'speed at the end': (
+        {'points': [point(positions=[0.0, 0.0], velocities=[1.0, 0.0])]},
+        'last velocity',
+    ),
+    'beyond any motor': ({'points': points([1e300, 0.0], [0.0, 0.0])}, 'effort of 1e+300 N m'),
+    'beyond any arm': ({'points': [point(positions=[1e300, 0.0])]}, 'position of 1e+300 rad'),
+    'elsewhere': ({'points': [point(positions=[9.0, 0.0])]}, 'should be at 9 rad by now'),
     'over long ago': ({'stamp': 0.5, 'points': points([0.0, 0.0], [0.0, 0.0])}, 'it ended at'),
 }
 """Fields of commands that cannot be played, and what is said of each."""
@@ -415,7 +425,7 @@ def test_feedback_holds_what_friction_would_stop(graph):
 
 
 def test_efforts_move_it_instead_of_trajectories(graph):
-    plant = Plant(graph, {**QUICK, 'input': 'effort'})
+    plant = Plant(graph, {**QUICK, 'input': 'effort', 'input_timeout': 10.0})
     assert graph.probe.count_subscribers(COMMAND) == 0
     graph.publish(EFFORTS, Float64MultiArray(data=[2e-4]))
     graph.expect(lambda: plant.states[-1].effort[0] == 2e-4, 'the effort')
@@ -427,6 +437,64 @@ def test_efforts_move_it_instead_of_trajectories(graph):
     assert plant.states[-1].velocity[0] > 0.0
     graph.publish(EFFORTS, Float64MultiArray(data=[0.0]))
     graph.expect(lambda: plant.states[-1].effort[0] == 0.0, 'no effort')
+
+
+def test_a_stream_of_efforts_moves_it_as_samples_that_are_held(graph):
+    plant = Plant(graph, {'use_sim_time': True, 'input': 'effort'})
+    plant.drive(100.0)
+    period, (_, efforts) = 0.01, wave(points=101)
+    starts = []
+    for number, effort in enumerate(efforts.tolist()):
+        starts.append(plant.time())
+        graph.publish(EFFORTS, Float64MultiArray(data=[effort]))
+        graph.expect(lambda e=effort: plant.node._arm._simulated._held == e, 'the effort')
+        plant.drive(100.0 + period * (number + 1))
+    plant.drive(101.5)
+    times, shown = plant.times, plant.table('effort')[:, 0]
+    # At the very moment of a change a sample may belong to either side of it.
+    held = [efforts[np.searchsorted(starts, times + shift) - 1] for shift in (-1e-6, 1e-6)]
+    streamed = times > starts[0] + 1e-3
+    assert ((shown == held[0]) | (shown == held[1]))[streamed].all()
+    planned = expected_motion(PAPER, starts[0] + period / 2, times)
+    assert np.abs(plant.table('position') - planned).max() < 2e-3
+    assert np.ptp(planned[:, 0]) > 0.2
+    assert quiet(graph)
+
+
+def test_a_stream_that_breaks_stops_safely_with_one_warning(graph):
+    plant = Plant(graph, {**QUICK, 'input': 'effort', 'input_timeout': 0.5})
+    graph.publish(EFFORTS, Float64MultiArray(data=[2e-4]))
+    (warning,) = plant.logged('stream of efforts broke')
+    assert 'none came for 0.5 s' in warning
+    plant.wait_until(plant.now() + 5.0)
+    applied = plant.times[plant.table('effort')[:, 0] != 0.0]
+    assert np.ptp(applied) == pytest.approx(0.48, abs=0.03)
+    assert len(graph.logged('stream of efforts broke')) == 1
+    graph.publish(EFFORTS, Float64MultiArray(data=[1e-4]))  # and goes on with the next stream
+    graph.expect(lambda: plant.states[-1].effort[0] == 1e-4, 'the effort')
+
+
+def test_what_makes_no_sense_in_a_stream_is_ignored(graph):
+    plant = Plant(graph, {**QUICK, 'input': 'effort', 'input_timeout': 10.0})
+    for bad in ([], [1e-4, 0.0], [nan], [-inf], [1e300]):
+        graph.publish(EFFORTS, Float64MultiArray(data=bad))
+    plant.logged('effort ignored: ')
+    plant.wait_until(plant.now() + 1.0)
+    assert not plant.table('effort').any()
+
+
+def test_an_arm_that_runs_away_is_stopped_until_it_is_reset(graph):
+    plant = Plant(graph, QUICK)
+    graph.publish(COMMAND, trajectory(0.0, points=points([1e5, 0.0], [0.0, 0.0])))
+    plant.logged('stopped until it is reset: joint')
+    graph.publish(COMMAND, trajectory(0.0))
+    plant.logged('trajectory ignored: the arm has been stopped')
+    for field in ('position', 'velocity', 'effort'):
+        assert np.isfinite(plant.table(field)).all()
+    assert not np.any(plant.states[-1].velocity)
+    assert graph.call(Trigger, RESET).success
+    plant.play(plant.ahead())
+    assert np.abs(plant.table('effort')[-100:, 0]).max() == pytest.approx(PEAK, rel=0.05)
 
 
 def test_names_follow_the_namespace_and_the_parameters(graph):
@@ -446,6 +514,8 @@ CONTRADICTIONS = {
     'position': ({'initial_position': [0.0]}, 'one number per joint, 2, got 1'),
     'saturation': ({'torque.saturation': [1.0, 1.0]}, 'per actuated joint, 1, got 2'),
     'negative saturation': ({'torque.saturation': [-1.0]}, 'torque.saturation must be'),
+    'timeout': ({'input_timeout': 0.0}, 'input_timeout'),
+    'tolerance': ({'start_tolerance': nan}, 'start_tolerance must be'),
     'gain': ({'feedback.p': [nan]}, 'feedback.p must be'),
     'rate': ({'publish_rate': 2000.0}, 'publish_rate'),
     'seed': ({'noise.seed': -1}, 'seed must be at least 0'),

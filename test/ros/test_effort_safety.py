@@ -1,0 +1,134 @@
+"""Nothing moves by itself: not after a restart, not from an old, late or foreign command."""
+
+from flat_planner_ros.ros import conversions
+from flat_planner_ros.ros.planner_node import PlannerNode
+import numpy as np
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+COMMAND = '/flat_planner/joint_trajectory'
+GOAL = '/flat_planner/goal'
+PLAN = '/flat_planner/plan'
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+DURATION = 6.0
+"""Of a motion [s]: long enough to restart a process in the middle of it."""
+
+
+def goal(position: float, duration: float = DURATION) -> JointTrajectory:
+    """Return a goal for joint 1."""
+    point = JointTrajectoryPoint(positions=[position])
+    point.time_from_start = conversions.duration_msg(duration)
+    return JointTrajectory(joint_names=['joint1'], points=[point])
+
+
+def stamp(message) -> float:
+    """Return when a message is stamped [s]."""
+    return conversions.seconds(message.header.stamp)
+
+
+class Watched:
+    """A planner in the test and a plant in a process of its own, both watched."""
+
+    def __init__(self, graph, *arguments):
+        """Start both and wait for the first joint state."""
+        self.graph, self.arguments = graph, arguments
+        self.states = graph.collect(JointState, 'joint_states', 1000, matched=False)
+        self.planner = graph.create(PlannerNode)
+        self.start()
+
+    def start(self):
+        """Start a plant and wait until it shows itself and hears commands."""
+        # One that was killed stays in the graph for a while.
+        listeners = self.graph.probe.count_subscribers(COMMAND)
+        self.plant = self.graph.start('plant_node', *self.arguments)
+        self.states.clear()
+        self.graph.expect(lambda: self.states, 'joint states of a new plant')
+        self.graph.expect(
+            lambda: self.planner.count_subscribers(COMMAND) > listeners, 'a new listener'
+        )
+
+    def move(self, position: float, duration: float = DURATION) -> JointTrajectory:
+        """Send a goal until it is accepted: a planner may not have heard of the arm; its plan."""
+        plans = self.graph.collect(JointTrajectory, PLAN)
+        for _ in range(10):
+            self.graph.publish(GOAL, goal(position, duration))
+            if self.graph.spin_until(lambda: plans, 1.0):
+                break
+        return plans[0]
+
+    def wait_until(self, time: float):
+        """Wait for a joint state stamped then or later."""
+        self.graph.expect(
+            lambda: self.states and stamp(self.states[-1]) >= time, f'joint states until {time}'
+        )
+
+    def efforts(self) -> np.ndarray:
+        """Return the efforts of joint 1 since the last restart [N m]."""
+        return np.array([state.effort[0] for state in self.states])
+
+
+def test_a_plant_that_was_killed_in_a_motion_does_not_take_it_up_again(graph):
+    watched = Watched(graph)
+    start = stamp(watched.move(1.0))
+    watched.wait_until(start + 0.2 * DURATION)
+    assert watched.efforts().any()
+    watched.plant.kill()
+    watched.start()
+    assert stamp(watched.states[0]) < start + DURATION, 'restarted within the motion'
+    late = graph.collect(JointTrajectory, PLAN, LATCHED)
+    graph.expect(lambda: late, 'the plan, latched all the same')
+    watched.wait_until(start + DURATION + 0.2)
+    assert not watched.efforts().any()
+    assert not np.any([state.position for state in watched.states])
+    watched.move(0.5, 1.0)  # and the next goal works
+    graph.expect(lambda: watched.states[-1].position[0] > 0.49, 'the next motion')
+
+
+def test_a_command_sent_again_after_a_restart_is_refused_as_elsewhere(graph):
+    watched = Watched(graph)
+    commands = graph.collect(JointTrajectory, COMMAND)
+    watched.move(1.0)
+    graph.expect(lambda: commands, 'a command')
+    watched.wait_until(stamp(commands[0]) + 0.2 * DURATION)
+    watched.plant.kill()
+    watched.start()
+    graph.publish(COMMAND, commands[0], readers=3)
+    graph.expect(lambda: graph.logged('trajectory ignored: joint 1 should be at'), 'a refusal')
+    watched.wait_until(stamp(commands[0]) + DURATION + 0.2)
+    assert not watched.efforts().any()
+
+
+@pytest.mark.parametrize('late_by', [1.001, 2.0, 1e9])
+def test_a_command_older_than_its_own_length_is_never_played(graph, late_by):
+    watched = Watched(graph)
+    point = JointTrajectoryPoint(time_from_start=conversions.duration_msg(DURATION), effort=[0.0])
+    first = JointTrajectoryPoint(effort=[1e-3])
+    message = JointTrajectory(joint_names=['joint1'], points=[first, point])
+    now = conversions.seconds(watched.planner.get_clock().now().to_msg())
+    message.header.stamp = conversions.time_msg(max(1e-9, now - late_by * DURATION))
+    graph.publish(COMMAND, message)
+    graph.expect(lambda: graph.logged('trajectory ignored: it ended at'), 'a refusal')
+    watched.wait_until(stamp(watched.states[-1]) + 0.2)
+    assert not watched.efforts().any()
+
+
+def test_a_planner_that_was_restarted_moves_nothing(graph):
+    watched = Watched(graph)
+    graph.remove(watched.planner)
+    planner = graph.start('planner_node')
+    start = stamp(watched.move(1.0, 1.0))
+    watched.wait_until(start + 0.5)
+    planner.kill()
+    watched.wait_until(start + 1.2)  # The plant has all of the motion, and ends it.
+    assert watched.states[-1].position[0] == pytest.approx(1.0, abs=1e-3)
+    watched.states.clear()
+    started = len(graph.logged('no model is given'))
+    graph.start('planner_node')
+    graph.expect(lambda: len(graph.logged('no model is given')) > started, 'a new planner')
+    watched.wait_until(start + 3.0)
+    assert not watched.efforts().any()
+    watched.move(0.0, 1.0)
+    graph.expect(lambda: abs(watched.states[-1].position[0]) < 1e-3, 'the way back')
