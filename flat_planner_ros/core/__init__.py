@@ -8,6 +8,7 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
@@ -19,6 +20,7 @@ from flat_planner_ros.core.errors import (
     OutOfReach,
     UncertifiedPlan,
 )
+from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.goal import (
     check_point_count,
@@ -37,6 +39,7 @@ from flat_planner_ros.core.insensitivity import (
     MAX_INSENSITIVITY,
     Nominal,
 )
+from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
@@ -59,10 +62,17 @@ from flat_planner_ros.core.robustness import (
 )
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import (
+    Ended,
+    Outcome,
+    PlannerSession,
+    SessionSettings,
+    StartSource,
+)
 from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.timeline import Motion, Track
 from flat_planner_ros.core.tradeoff import (
     advice,
     baselines,
@@ -86,6 +96,9 @@ __all__ = [
     'Criterion',
     'DEFAULT_WEIGHT',
     'EffortProfile',
+    'Ended',
+    'Extrema',
+    'extrema_of',
     'fit_oscillation',
     'flat_map',
     'FlatMap',
@@ -99,10 +112,12 @@ __all__ = [
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
+    'JointLimits',
     'JointSample',
     'Law',
     'least_effort',
     'Level',
+    'LimitUse',
     'LinkBody',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
@@ -113,13 +128,15 @@ __all__ = [
     'MotionLaw',
     'MotionRequest',
     'NaturalMode',
+    'NoFeasibleDuration',
     'Nominal',
     'NotFlat',
     'OscillationFit',
+    'Outcome',
     'OutOfReach',
     'PacedArm',
-    'Plan',
     'plan',
+    'Plan',
     'PlanarArm',
     'PlannedMotion',
     'PlannerSession',
@@ -129,6 +146,7 @@ __all__ = [
     'predicted_residual',
     'PredictedResidual',
     'QuadraticCost',
+    'Quantity',
     'Reason',
     'rehearse',
     'ReportedEstimate',
@@ -141,12 +159,14 @@ __all__ = [
     'SessionSettings',
     'shaped_quintic',
     'Shaper',
+    'shortest_plan',
     'SimulatedArm',
     'SimulationSettings',
     'StartSource',
     'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
+    'Track',
     'tradeoff',
     'TradeoffPoint',
     'UncertaintyBox',

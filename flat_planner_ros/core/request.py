@@ -135,9 +135,7 @@ class PlanningOptions:
     insensitivity: Insensitivity = field(default_factory=Insensitivity)
 
     def __post_init__(self) -> None:
-        """Lock a copy of the matrix, and refuse what has no meaning together."""
-        if self.strategy is Strategy.INSENSITIVE and self.flat_model is not FlatModel.EXACT:
-            raise InvalidRequest('strategy insensitive needs flat_model exact')
+        """Lock a copy of the matrix."""
         if self.custom is not None:
             custom = np.array(self.custom, dtype=float)
             custom.setflags(write=False)

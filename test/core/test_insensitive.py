@@ -320,8 +320,10 @@ def test_one_way_to_choose():
         Insensitivity(max_effort_rms=-1.0)
     with pytest.raises(InvalidRequest, match='modes'):
         Insensitivity(modes=100)
+    request = MotionRequest(start=np.zeros(2), final=np.array([1.0, 0.0]), duration=1.0)
+    approximate = PlanningOptions(strategy=Strategy.INSENSITIVE, flat_model=FlatModel.APPROXIMATE)
     with pytest.raises(InvalidRequest, match='flat_model exact'):
-        PlanningOptions(strategy=Strategy.INSENSITIVE, flat_model=FlatModel.APPROXIMATE)
+        plan(request, ARM, approximate)
 
 
 def test_a_weight_serves_every_distance():
