@@ -26,6 +26,8 @@ FloatArray = NDArray[np.float64]
 
 _ORDERS = np.arange(CONDITIONS + 1.0)
 
+_UNIT_END = 0.5 * np.eye(CONDITIONS)[0]
+
 RESIDUAL_STEPS = 1
 """Corrections of the solved boundary conditions by their own residual."""
 
@@ -81,7 +83,7 @@ def extremals(coefficients: FloatArray, duration: float, jets: Sequence[Jets]) -
         middle = 0.5 * (ends.start[0] + ends.end[0])
         modes = []
         if middle:
-            modes.append(Mode(rate=0j, origin=0, coefficients=np.array([complex(middle)])))
+            modes.append(Mode(rate=0j, origin=0, coefficients=(complex(middle),)))
         mirrored = ALTERNATING * start
         for parity in (-1.0, 1.0):
             # Right-hand side of the law's odd or even part about the middle, at the end x = 1.
@@ -93,6 +95,24 @@ def extremals(coefficients: FloatArray, duration: float, jets: Sequence[Jets]) -
                 modes.extend(solvers[parity].modes(target))
         laws.append(MotionLaw(duration=duration, modes=tuple(modes)))
     return laws
+
+
+def unit_modes(coefficients: FloatArray) -> tuple[Mode, ...]:
+    """
+    Return the stationary law from rest at -1/2 to rest at 1/2 in normalised time; it is odd.
+
+    Parameters
+    ----------
+    coefficients
+        a_0 ... a_6 in normalised time, shape (7,) [-].
+
+    Raises
+    ------
+    UncertifiedPlan
+        The boundary conditions are singular in double precision.
+
+    """
+    return tuple(_BoundarySolver(clusters(coefficients), -1.0).modes(_UNIT_END))
 
 
 def euler_lagrange_residual(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> float:
@@ -118,9 +138,9 @@ def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
         magnitudes [-].
 
     """
-    terms = coefficients[1:, None] * jet[2::2]
-    size = np.abs(terms).sum(axis=0).max()
-    return float(np.abs(terms.sum(axis=0)).max() / size) if size > 0.0 else 0.0
+    weights, even = coefficients[1:], jet[2::2]
+    size = float((np.abs(weights) @ np.abs(even)).max())
+    return float(np.abs(weights @ even).max()) / size if size > 0.0 else 0.0
 
 
 def conserved_momentum(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> FloatArray:
@@ -148,14 +168,11 @@ class _BoundarySolver:
         ordered = sorted(found, key=lambda cluster: abs(cluster.centre))
         self._parity = parity
         self._blocks = [block_of(cluster, parity) for cluster in ordered]
-        matrix = np.array([column for block in self._blocks for column in block.columns]).T
+        columns = [column for block in self._blocks for column in block.columns]
         self._rows = _row_factors([b.growth for b in self._blocks for _ in b.columns])
-        matrix *= self._rows[:, None]
-        self._columns = 1.0 / np.abs(matrix).max(axis=0)
-        matrix *= self._columns
-        self._matrix = matrix
+        self._matrix = self._rows[:, None] * np.array(columns).T
         try:
-            self._inverse = np.linalg.inv(matrix)
+            self._inverse = np.linalg.inv(self._matrix)
         except np.linalg.LinAlgError as error:
             raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
 
@@ -165,16 +182,15 @@ class _BoundarySolver:
         weights = self._inverse @ target
         for _ in range(RESIDUAL_STEPS):
             weights += self._inverse @ (target - self._matrix @ weights)
-        return _combined(self._blocks, self._columns * weights, self._parity)
+        return _combined(self._blocks, weights.tolist(), self._parity)
 
 
-def _combined(blocks: Sequence[Block], weights: FloatArray, parity: float) -> list[Mode]:
+def _combined(blocks: Sequence[Block], weights: list[float], parity: float) -> list[Mode]:
     """Return one mode for each block, with its mirror image unless it is symmetric by itself."""
     modes, first = [], 0
     for block in blocks:
-        last = first + len(block.series)
-        coefficients = (weights[first:last, None] * block.series).sum(axis=0)
-        mode = Mode(rate=block.rate, origin=block.origin, coefficients=coefficients)
+        last = first + len(block.columns)
+        mode = Mode(block.rate, block.origin, block.combined(weights[first:last]))
         modes.append(mode)
         if block.origin != 0:
             modes.append(mode.mirrored(parity))

@@ -9,8 +9,9 @@ every time; the others are summed one by one.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import TypeVar
+from functools import cache, lru_cache
+from itertools import zip_longest
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +30,17 @@ VANISHING = 100.0
 """Decay from which an exponential on an even grid is zero [-]."""
 
 BLOCK = 64
-"""Times per row of an exponential on an even grid, which is an outer product of two tables."""
+"""Times of an even grid whose exponentials are multiples of one small table."""
 
-CHUNK = 64 * BLOCK
-"""Times evaluated together: their exponentials stay in the cache of the processor."""
+CHUNK = 32 * BLOCK
+"""Times of an even grid evaluated together, few enough for the cache of the processor."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Mode:
+PLACES_KEPT = 4
+"""Even grids that are remembered."""
+
+
+class Mode(NamedTuple):
     """
     Real part of exp(rate (x - origin)) * sum_k coefficients[k] (x - origin)^k.
 
@@ -50,27 +54,19 @@ class Mode:
     origin
         -1, 0 or 1 [-].
     coefficients
-        Of ascending powers, shape (k,) [rad].
+        Of ascending powers [rad].
 
     """
 
     rate: complex
     origin: int
-    coefficients: ComplexArray
-
-    def __post_init__(self) -> None:
-        """Lock the coefficients."""
-        self.coefficients.setflags(write=False)
+    coefficients: tuple[complex, ...]
 
     def mirrored(self, sign: float) -> 'Mode':
         """Return sign times the mode run backwards, x -> -x."""
-        coefficients = sign * self.coefficients
-        coefficients[1::2] *= -1.0
-        return Mode(rate=-self.rate, origin=-self.origin, coefficients=coefficients)
-
-    def scaled(self, factor: float) -> 'Mode':
-        """Return factor times the mode."""
-        return Mode(rate=self.rate, origin=self.origin, coefficients=factor * self.coefficients)
+        signs = (sign, -sign)
+        coefficients = tuple(signs[k % 2] * c for k, c in enumerate(self.coefficients))
+        return Mode(-self.rate, -self.origin, coefficients)
 
     def derivatives(self, order: int) -> ComplexArray:
         """Return the coefficients of the derivatives in x, shape (k, order + 1)."""
@@ -93,30 +89,26 @@ class ModeSum:
     decays
         Rates d of the exponentials exp(-d u) that fall with the distance u from an end, shape
         (m,).
-    from_start, from_end
-        Real factors of Re and -Im of these exponentials, u = x + 1 and u = 1 - x, for every
-        derivative, shape (orders, 2 m).
-    powers
-        Coefficients of ascending powers of x for every derivative, shape (orders, terms).
+    factors
+        For every derivative: of Re and -Im of each of these exponentials, with u = x + 1 and with
+        u = 1 - x, and of ascending powers of x, shape (orders, 4 m + terms).
     others
         Modes with both an exponential and powers, with their `Mode.derivatives`.
 
     """
 
     decays: ComplexArray
-    from_start: FloatArray
-    from_end: FloatArray
-    powers: FloatArray
+    factors: FloatArray
     others: tuple[tuple[Mode, ComplexArray], ...]
 
-    def at(self, after_start: FloatArray, before_end: FloatArray, order: int) -> FloatArray:
+    def at(self, distances: FloatArray, order: int) -> FloatArray:
         """
         Return the sum and its derivatives in x.
 
         Parameters
         ----------
-        after_start, before_end
-            x + 1 and 1 - x, both exact, shape (m,).
+        distances
+            From the start and from the end, x + 1 and 1 - x, both exact, shape (2, m).
         order
             Highest derivative wanted.
 
@@ -126,86 +118,119 @@ class ModeSum:
             Row k holds the k-th derivative, shape (order + 1, m).
 
         """
-        result = np.zeros((order + 1, len(after_start)))
+        count, places = len(self.decays), distances.shape[1]
+        basis = np.empty((self.factors.shape[1], places))
         # Far from its end an exponential vanishes: this underflow is the right answer.
         with np.errstate(under='ignore'):
-            if len(self.decays):
-                for factors, u in ((self.from_start, after_start), (self.from_end, before_end)):
-                    fall = np.exp(np.multiply.outer(-self.decays, u))
-                    result += factors[: order + 1] @ np.concatenate([fall.real, fall.imag])
-            if self.powers.shape[1]:
-                x = 0.5 * (after_start - before_end)
-                result += self.powers[: order + 1] @ _powers(x, self.powers.shape[1])
-            self._add_others(result, after_start, before_end)
+            if count:
+                fall = np.multiply.outer(-self.decays, distances)
+                np.exp(fall, out=fall)
+                _split(fall, basis[: 4 * count].reshape(count, 2, 2, places))
+            if len(basis) > 4 * count:
+                _fill_powers(basis[4 * count :], 0.5 * (distances[0] - distances[1]))
+            result: FloatArray = self.factors[: order + 1] @ basis
+            if self.others:
+                self._add_others(result, distances)
         return result
 
-    def on_even_grid(self, intervals: int, order: int) -> FloatArray:
-        """Return the same as `at` on intervals + 1 even times, both ends included."""
-        count = intervals + 1
-        result = np.zeros((order + 1, count))
-        mirrored = result[:, ::-1]
-        factors = np.concatenate([self.from_start[: order + 1], self.from_end[: order + 1]])
+    def fill_odd_grid(self, table: FloatArray, scales: FloatArray) -> None:
+        """
+        Write an odd sum and its derivatives in x at even times, both ends included.
+
+        Parameters
+        ----------
+        table
+            Its rows take the derivatives in ascending order, shape (orders, m), m > 1.
+        scales
+            Factors of the derivatives, shape (orders,).
+
+        """
+        orders, intervals = len(table), table.shape[1] - 1
+        count, half = len(self.decays), intervals // 2 + 1
+        size, places, x = even_places(intervals)
+        factors = scales[:, None] * self.factors[:orders]
+        amplitudes = factors[:, None, : 4 * count].view(complex).reshape(orders, 1, count, 2)
+        signs, mirrored = _odd_signs(orders), table[:, ::-1]
         with np.errstate(under='ignore'):
-            fine = _fall(self.decays, np.arange(BLOCK), intervals)
-            for start in range(0, count, CHUNK):
-                stop = min(start + CHUNK, count)
-                if len(self.decays):
-                    coarse = _fall(self.decays, np.arange(start, stop, BLOCK), intervals)
-                    fall = coarse[:, :, None] * fine[:, None, :]
-                    fall = fall.reshape(len(self.decays), -1)[:, : stop - start]
-                    both = factors @ np.concatenate([fall.real, fall.imag])
-                    # The same table serves both ends: counted from the end, grid is mirrored.
-                    result[:, start:stop] += both[: order + 1]
-                    mirrored[:, start:stop] += both[order + 1 :]
-                # Exactly odd about the middle.
-                x = np.arange(2.0 * start - intervals, 2.0 * stop - intervals, 2.0) / intervals
-                if self.powers.shape[1]:
-                    result[:, start:stop] += self.powers[: order + 1] @ _powers(
-                        x, self.powers.shape[1]
-                    )
-                self._add_others(result[:, start:stop], 1.0 + x, 1.0 - x)
-        return result
+            fine, coarse = self._grid_tables(size, places)
+            for start in range(0, half, CHUNK):
+                stop = min(start + CHUNK, half)
+                blocks = coarse[start // size : -(-stop // size)]
+                part = np.zeros((orders, stop - start))
+                if count:
+                    scaled = np.multiply(amplitudes, blocks, order='C').view(float)
+                    product = scaled.reshape(orders * len(blocks), 4 * count) @ fine
+                    part = product.reshape(orders, -1)[:, : stop - start]
+                if factors.shape[1] > 4 * count:
+                    powers = np.empty((factors.shape[1] - 4 * count, stop - start))
+                    _fill_powers(powers, x[start:stop])
+                    part += factors[:, 4 * count :] @ powers
+                if self.others:
+                    distances = np.array([1.0 + x[start:stop], 1.0 - x[start:stop]])
+                    self._add_others(part, distances, scales)
+                np.multiply(part, signs, out=mirrored[:, start:stop])
+                table[:, start:stop] = part
+
+    def _grid_tables(self, size: int, places: FloatArray) -> tuple[FloatArray, ComplexArray]:
+        """
+        Return the exponentials of an even grid in two tables, whose product they are.
+
+        Returns
+        -------
+        tuple[FloatArray, ComplexArray]
+            Re and -Im within a block, shape (4 m, size), and those of the blocks, shape
+            (blocks, m, 2).
+
+        """
+        exponents = np.multiply.outer(-self.decays, places)
+        fall = np.exp(exponents)
+        # Else the product of the tables, or a multiple of it, would leave the range of doubles.
+        fall[exponents.real < -VANISHING] = 0.0
+        fine = np.empty((len(fall), 2, 2, size))
+        _split(fall[:, :size], fine[:, 0])
+        fine[:, 1] = fine[:, 0, :, ::-1]
+        blocks = (len(places) - size) // 2
+        coarse = fall[:, size:].reshape(len(fall), 2, blocks).transpose(2, 0, 1)
+        return fine.reshape(4 * len(fall), size), coarse
 
     def _add_others(
-        self, result: FloatArray, after_start: FloatArray, before_end: FloatArray
+        self, result: FloatArray, distances: FloatArray, scales: FloatArray | None = None
     ) -> None:
         """Add the modes that have both an exponential and powers."""
+        after_start, before_end = distances
         for mode, table in self.others:
             u = (0.5 * (after_start - before_end), -before_end, after_start)[mode.origin]
-            values = table.T[: len(result)] @ _powers(u, len(table))
-            result += np.real(values * np.exp(mode.rate * u))
+            powers = np.empty((len(table), len(u)))
+            _fill_powers(powers, u)
+            values = (table[:, : len(result)].T @ powers) * np.exp(mode.rate * u)
+            result += values.real if scales is None else scales[:, None] * values.real
 
 
 def mode_sum(modes: Sequence[Mode], order: int = TOP_ORDER) -> ModeSum:
     """Return the sum of modes, ready for derivatives up to an order."""
-    series: list[ComplexArray] = []
+    series: list[tuple[complex, ...]] = []
     others: list[tuple[Mode, ComplexArray]] = []
-    ends: dict[complex, dict[int, complex]] = {}  # decay: {origin: amplitude}
+    ends: dict[complex, list[complex]] = {}  # decay: amplitudes at start and end
     for mode in modes:
-        if mode.origin == 0 and mode.rate == 0.0:
-            series.append(mode.coefficients)
-        elif mode.origin != 0 and len(mode.coefficients) == 1:
-            at_ends = ends.setdefault(mode.origin * mode.rate, {-1: 0j, 1: 0j})
-            at_ends[mode.origin] += complex(mode.coefficients[0])
+        rate, origin, coefficients = mode
+        if origin == 0 and rate == 0.0:
+            series.append(coefficients)
+        elif origin != 0 and len(coefficients) == 1:
+            ends.setdefault(origin * rate, [0j, 0j])[origin > 0] += coefficients[0]
         else:
-            reach = 2.0 if mode.origin else 1.0
+            reach = 2.0 if origin else 1.0
             others.append((mode, _trimmed(mode.derivatives(order), reach)))
     decays = np.array(list(ends), dtype=complex)
-    amplitudes = np.array([[a[-1], a[1]] for a in ends.values()], dtype=complex).reshape(-1, 2)
-    factors = np.empty((2, order + 1, len(decays)), dtype=complex)
-    factors[:, 0] = amplitudes.T
-    for k in range(1, order + 1):
-        np.multiply(factors[:, k - 1], decays, out=factors[:, k])
-    # Counted from the start, an exponential that falls has the rate -d.
-    factors[0, 1::2] *= -1.0
-    from_start, from_end = np.concatenate([factors.real, -factors.imag], axis=2)
-    return ModeSum(
-        decays=decays,
-        from_start=from_start,
-        from_end=from_end,
-        powers=_power_table(series, order),
-        others=tuple(others),
-    )
+    table = np.empty((order + 1, len(decays), 2), dtype=complex)
+    if len(decays):
+        table[0] = list(ends.values())
+        # Counted from the start, an exponential that falls has the rate -d.
+        table[1:, :, 0], table[1:, :, 1] = -decays, decays
+        np.multiply.accumulate(table, out=table)
+    factors = table.reshape(order + 1, 2 * len(decays)).view(float)
+    if series:
+        factors = np.concatenate([factors, _power_table(series, order)], axis=1)
+    return ModeSum(decays=decays, factors=factors, others=tuple(others))
 
 
 def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
@@ -232,14 +257,11 @@ def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
     return np.multiply(padded[..., index], falling, dtype=series.dtype)
 
 
-def _power_table(series: Sequence[ComplexArray], order: int) -> FloatArray:
+def _power_table(series: Sequence[tuple[complex, ...]], order: int) -> FloatArray:
     """Return the coefficients of the derivatives of a sum of power series, powers in columns."""
-    total = np.zeros(max(map(len, series), default=0))
-    for coefficients in series:
-        total[: len(coefficients)] += coefficients.real
-    if not len(total):
-        return np.zeros((order + 1, 0))
-    return np.ascontiguousarray(_trimmed(series_derivatives(total, order), 1.0).T)
+    terms = zip_longest(*series, fillvalue=0j)
+    total = np.array([sum(coefficients).real for coefficients in terms])
+    return _trimmed(series_derivatives(total, order), 1.0).T
 
 
 def _trimmed(table: NDArray[Number], reach: float) -> NDArray[Number]:
@@ -259,19 +281,54 @@ def _falling(terms: int, order: int) -> tuple[NDArray[np.int_], FloatArray]:
     return powers + np.arange(order + 1), np.multiply.accumulate(steps, axis=1)
 
 
-def _powers(x: FloatArray, terms: int) -> FloatArray:
-    """Return 1, x, x^2, ... in rows."""
-    table = np.empty((terms, len(x)))
+@cache
+def _odd_signs(orders: int) -> FloatArray:
+    """Return the signs of the derivatives of an odd function at the mirrored place, (m, 1)."""
+    signs = np.ones((orders, 1))
+    signs[::2] = -1.0
+    return signs
+
+
+def _fill_powers(table: FloatArray, x: FloatArray) -> None:
+    """Write 1, x, x^2, ... into rows."""
     table[0] = 1.0
-    for k in range(1, terms):
+    for k in range(1, len(table)):
         np.multiply(table[k - 1], x, out=table[k])
-    return table
 
 
-def _fall(decays: ComplexArray, index: NDArray[np.int_], intervals: int) -> ComplexArray:
-    """Return exp(-d u) at some places u = 2 i / intervals of an even grid, shape (m, places)."""
-    exponents = np.multiply.outer(-decays, 2.0 * index / intervals)
-    fall: ComplexArray = np.exp(exponents)
-    # Else the product of two tables, or a multiple of it, would leave the range of doubles.
-    fall[exponents.real < -VANISHING] = 0.0
-    return fall
+def _split(fall: ComplexArray, parts: FloatArray) -> None:
+    """Write Re and -Im of exponentials, shape (..., m), into a table, shape (..., 2, m)."""
+    parts[..., 0, :] = fall.real
+    np.negative(fall.imag, out=parts[..., 1, :])
+
+
+class EvenPlaces(NamedTuple):
+    """
+    The first half of an even grid in blocks.
+
+    Attributes
+    ----------
+    size
+        Of a block.
+    places
+        Distances from its first time within a block, distances of the blocks' first times from
+        the start, distances of their last ones from the end, shape (size + 2 blocks,).
+    x
+        Normalised times, exactly odd about the middle, shape (half,).
+
+    """
+
+    size: int
+    places: FloatArray
+    x: FloatArray
+
+
+@lru_cache(maxsize=PLACES_KEPT)
+def even_places(intervals: int) -> EvenPlaces:
+    """Return the places of a grid's first half, the middle included."""
+    half = intervals // 2 + 1
+    size = min(BLOCK, half)
+    first = np.arange(0, half, size)
+    index = np.concatenate([np.arange(size), first, intervals - size + 1 - first])
+    x = np.arange(-float(intervals), 2.0 * half - intervals, 2.0) / intervals
+    return EvenPlaces(size, index * (2.0 / intervals), x)

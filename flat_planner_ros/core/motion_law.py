@@ -5,7 +5,6 @@ The modes are fixed in normalised time; a law stretches them to its duration, sc
 them, so that one set serves any distance and any place.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -81,7 +80,7 @@ class MotionLaw:
         terms = self.terms if order <= TOP_ORDER else mode_sum(self.modes, order)
         # Both distances are formed from t: a boundary layer may be far thinner than the spacing
         # of floating-point numbers near x = 1.
-        table = terms.at(rate * times, rate * (self.duration - times), order)
+        table = terms.at(rate * np.array([times, self.duration - times]), order)
         table *= (self.factor * rate ** np.arange(order + 1.0))[:, None]
         table[0] += self.offset
         return table
@@ -94,10 +93,3 @@ class MotionLaw:
     def transformed(self, factor: float, offset: float) -> 'MotionLaw':
         """Return offset + factor times this law."""
         return replace(self, factor=factor * self.factor, offset=offset + factor * self.offset)
-
-
-def normalised_jet(
-    modes: Sequence[Mode], after_start: FloatArray, before_end: FloatArray, order: int
-) -> FloatArray:
-    """Return the sum of modes and its derivatives with respect to x, as `ModeSum.at`."""
-    return mode_sum(modes, order).at(after_start, before_end, order)

@@ -91,14 +91,15 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
 
 def _companion_roots(ascending: FloatArray) -> ComplexArray:
     """Return the roots, conjugates exact; scaled to size one, so that nothing overflows."""
-    descending = ascending[::-1]
-    degree = len(descending) - 1
+    first = ascending[-2::-1].tolist()
+    degree = len(first)
     if degree == 0:
         return np.zeros(0, dtype=complex)
-    scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(descending.tolist()) if n)
+    scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(first, start=1))
     companion = np.eye(degree, k=-1)
-    companion[0] = -descending[1:] / scale ** np.arange(1.0, degree + 1.0)
-    roots: ComplexArray = scale * np.linalg.eigvals(companion).astype(complex)
+    companion[0] = [-a / scale**n for n, a in enumerate(first, start=1)]
+    roots: ComplexArray = np.linalg.eigvals(companion).astype(complex)
+    roots *= scale
     return roots
 
 

@@ -30,9 +30,6 @@ FAR = 300.0
 ALTERNATING = (-1.0) ** np.arange(CONDITIONS)
 """Signs of the derivatives of a function run backwards."""
 
-_ALONE = np.array([[1.0 + 0.0j], [-1j]])
-"""Series of one exponential: its real and its imaginary part."""
-
 CENTRES_KEPT = 32
 """Solutions around zero that are remembered, mostly 1, x, x^2, x^3."""
 
@@ -50,7 +47,8 @@ class Block(NamedTuple):
     rate, origin
         Of their modes; those with an origin at the end have a mirror image.
     series
-        Coefficients of the modes, one in each row, shape (functions, terms).
+        Coefficients of the modes, one in each row, shape (functions, terms); None if they are the
+        real and the imaginary part of one exponential.
 
     """
 
@@ -58,7 +56,13 @@ class Block(NamedTuple):
     columns: list[list[float]]
     rate: complex
     origin: int
-    series: ComplexArray
+    series: ComplexArray | None
+
+    def combined(self, weights: list[float]) -> tuple[complex, ...]:
+        """Return the coefficients of a combination of the solutions."""
+        if self.series is None:
+            return (complex(weights[0], -weights[1] if len(weights) > 1 else 0.0),)
+        return tuple((np.array(weights) @ self.series).tolist())
 
 
 def block_of(cluster: Cluster, parity: float) -> Block:
@@ -104,9 +108,9 @@ def _exponentials(beta: complex, parity: float) -> Block:
         power *= beta
     columns = [[value.real for value in values]]
     if beta.imag == 0.0:
-        return Block(abs(beta), columns, beta, 1, _ALONE[:1])
+        return Block(abs(beta), columns, beta, 1, None)
     columns.append([value.imag for value in values])
-    return Block(abs(beta), columns, beta, 1, _ALONE)
+    return Block(abs(beta), columns, beta, 1, None)
 
 
 def _derivatives(rate: complex, series: ComplexArray, u: float) -> ComplexArray:

@@ -128,10 +128,10 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
 
 def _grid(task: Task, intervals: int) -> FloatArray:
     """Return the motion over 1 rad at even times."""
-    unit = task.unit.grid(intervals)
-    table = np.empty((len(unit) + 1, intervals + 1))
-    np.multiply(task.rates[:, None], unit, out=table[:-1])
-    np.matmul(task.rows[0], unit, out=table[-1])
+    table = np.empty((len(task.rates) + 1, intervals + 1))
+    task.unit.fill_grid(table[:-1], task.rates)
+    row = task.flat_map.effort
+    np.matmul(row, table[: len(row)], out=table[-1])
     table.setflags(write=False)
     return table
 

@@ -10,12 +10,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.extremal import (
-    extremal,
-    Jets,
-    momentum_of,
-    stationarity_residual,
-)
+from flat_planner_ros.core.extremal import momentum_of, stationarity_residual, unit_modes
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.quadrature import half_quadrature
 from flat_planner_ros.core.solutions import CONDITIONS
@@ -90,13 +85,23 @@ class UnitMotion:
 
     def jet(self, after_start: FloatArray, before_end: FloatArray) -> FloatArray:
         """Return the derivatives 0 to 6 at x + 1 and 1 - x, shape (7, m)."""
-        return self.law.terms.at(after_start, before_end, JET_ORDER)
+        return self.law.terms.at(np.array([after_start, before_end]), JET_ORDER)
 
-    def grid(self, intervals: int) -> FloatArray:
-        """Return the derivatives 0 to 6 at even times, ends exact, read-only, shape (7, m)."""
-        if intervals > MAX_KEPT_INTERVALS:
-            return _grid(self, intervals)
-        return _kept_grid(self, intervals)
+    def fill_grid(self, table: FloatArray, rates: FloatArray) -> None:
+        """
+        Write the derivatives 0 to 6 at even times, the residuals at the ends removed.
+
+        Parameters
+        ----------
+        table
+            Takes the derivatives, shape (7, m), m > 1.
+        rates
+            Their factors, shape (7,).
+
+        """
+        self.law.terms.fill_odd_grid(table, rates)
+        table[1:CONDITIONS, 0] = table[1:CONDITIONS, -1] = 0.0
+        table[0, 0], table[0, -1] = -0.5 * rates[0], 0.5 * rates[0]
 
     def mean(self, rows: FloatArray) -> Mean:
         """
@@ -144,19 +149,21 @@ def unit_motion(key: bytes) -> UnitMotion:
 
     """
     coefficients = np.frombuffer(key)
-    ends = 0.5 * np.eye(CONDITIONS)[0]
-    law = extremal(coefficients, 2.0, Jets(start=-ends, end=ends))
-    times = probes()
-    jet = law.terms.at(times, 2.0 - times, 2 * CONDITIONS)
+    law = MotionLaw(duration=2.0, modes=unit_modes(coefficients))
+    jet = law.terms.at(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
-    miss = np.maximum(np.abs(jet[:CONDITIONS, 0] + ends), np.abs(jet[:CONDITIONS, -1] - ends))
+    ends = zip(*jet[:CONDITIONS, [0, -1]].T.tolist(), peaks.tolist(), strict=False)
     # Relative to the start, as the value's own peak is the distance.
-    size = peaks[:CONDITIONS] + ends
+    halves = (0.5, *(CONDITIONS - 1) * (0.0,))
+    miss = [
+        max(abs(start + half), abs(end - half)) / (peak + half)
+        for half, (start, end, peak) in zip(halves, ends, strict=True)
+    ]
     return UnitMotion(
         law=law,
-        boundary_residual=float((miss / size).max()),
+        boundary_residual=float(np.array(miss).max()),
         optimality_residual=stationarity_residual(coefficients, jet) + KEY_ROUNDING,
-        momentum=float(momentum_of(coefficients, jet)[-2]),
+        momentum=float(momentum_of(coefficients, jet[:, -2])),
         peaks=peaks,
     )
 
@@ -164,22 +171,11 @@ def unit_motion(key: bytes) -> UnitMotion:
 @cache
 def probes() -> FloatArray:
     """
-    Return normalised times that crowd towards the start as fast as boundary layers can.
+    Return x + 1 and 1 - x at times that crowd towards the start as fast as boundary layers can.
 
     Those from 0 to 1, of which one half of a motion has enough, and last the end, 2.
     """
     layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
     times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
-    return np.append(times, 2.0)
-
-
-def _grid(unit: UnitMotion, intervals: int) -> FloatArray:
-    """Return a unit motion at even times, the residuals at the ends removed."""
-    table = unit.law.terms.on_even_grid(intervals, JET_ORDER)
-    table[1:CONDITIONS, 0] = table[1:CONDITIONS, -1] = 0.0
-    table[0, 0], table[0, -1] = -0.5, 0.5
-    table.setflags(write=False)
-    return table
-
-
-_kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
+    times = np.append(times, 2.0)
+    return np.array([times, 2.0 - times])

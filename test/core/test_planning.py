@@ -7,7 +7,7 @@ from flat_planner_ros.core import planning, unit_motion
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import InvalidCost, InvalidRequest, NotFlat, UncertifiedPlan
-from flat_planner_ros.core.extremal import Jets
+from flat_planner_ros.core.extremal import extremal, Jets
 from flat_planner_ros.core.flatness import FlatModel
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
 from flat_planner_ros.core.rollout import EffortProfile, rollout
@@ -237,17 +237,17 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, const
 @pytest.mark.parametrize('damage', ['end', 'middle'])
 def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
     """A law for other ends misses the boundary, one for another cost the optimality."""
-    compute = unit_motion.extremal
+    compute = unit_motion.unit_modes
     # A task that no other test has: nothing of it is in the cache.
     arm = paper_arm_with(2e-5)
 
-    def wrong(coefficients, duration, jets):
+    def wrong(coefficients):
         if damage == 'middle':
-            return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1], duration, jets)
-        far = Jets(start=jets.start, end=jets.end * (1.0 + 1e-8))
-        return compute(coefficients, duration, far)
+            return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1])
+        end = 0.5 * np.eye(6)[0]
+        return extremal(coefficients, 2.0, Jets(start=-end, end=end * (1.0 + 1e-8))).modes
 
-    monkeypatch.setattr(unit_motion, 'extremal', wrong)
+    monkeypatch.setattr(unit_motion, 'unit_modes', wrong)
     unit_motion.unit_motion.cache_clear()
     request.addfinalizer(unit_motion.unit_motion.cache_clear)
     quantity = {'end': 'boundary', 'middle': 'optimality'}[damage]
