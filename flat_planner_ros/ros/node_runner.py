@@ -57,34 +57,45 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
 
     """
     nodes: list[Node] = []
+    is_open = is_ready = False
     with _signals_caught() as interrupted:
         try:
-            # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
-            try:
-                _refuse_strays(sys.argv if args is None else args)
-                _init(args)
-                executor = _new_executor()
-                for create in creators:
-                    if interrupted.is_set():
-                        return 0
-                    nodes.append(create())
-                    executor.add_node(nodes[-1])
-            except (FlatPlannerError, ParameterException, RuntimeError) as error:
-                text = SOURCE_PLACE.sub('', ' '.join(str(error).split()))
-                hint = next((hint for part, hint in HINTS.items() if part in text), '')
-                print(f'cannot start: {text}{hint}', file=sys.stderr)
-                return 1
+            _refuse_strays(sys.argv if args is None else args)
+            _init(args)
+            is_open = True
+            executor = _new_executor()
+            for create in creators:
+                if interrupted.is_set():
+                    return 0
+                nodes.append(create())
+                executor.add_node(nodes[-1])
             for node in nodes:
                 node.get_logger().info('ready')
+            is_ready = True
             while rclpy.ok() and not interrupted.is_set():
                 executor.spin_once(timeout_sec=SPIN_PERIOD)
         except ExternalShutdownException:
             pass
+        # RuntimeError is what rcl raises for arguments and parameter files it cannot read, and for
+        # whatever is attempted in a context that has been shut down.
+        except (FlatPlannerError, ParameterException, RuntimeError) as error:
+            if not is_open or rclpy.ok():
+                if is_ready:
+                    raise
+                return _explained(error)
         finally:
             for node in nodes:
                 node.destroy_node()
             rclpy.try_shutdown()
     return 0
+
+
+def _explained(error: Exception) -> int:
+    """Print why there are no nodes; return the exit code."""
+    text = SOURCE_PLACE.sub('', ' '.join(str(error).split()))
+    hint = next((hint for part, hint in HINTS.items() if part in text), '')
+    print(f'cannot start: {text}{hint}', file=sys.stderr)
+    return 1
 
 
 def _init(args: Sequence[str] | None) -> None:

@@ -79,7 +79,7 @@ def test_a_hail_of_signals_does_no_more_than_one(graph, seed):
     assert_clean(process)
 
 
-@pytest.mark.parametrize('delay', [0.0, 0.1, 1.0])
+@pytest.mark.parametrize('delay', [0.0, 0.03, 0.06, 0.1, 0.15, 1.0])
 def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
     process = graph.run([sys.executable, '-c', SHUTDOWN.format(delay=delay)])
     if delay < 1.0:  # it may come before there is a context, and then does nothing
