@@ -8,6 +8,12 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.counterbalance import (
+    Counterbalances,
+    counterbalances,
+    displaced_com,
+    remedy,
+)
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
@@ -58,6 +64,9 @@ __all__ = [
     'bodies_of_constants',
     'bodies_of_links',
     'check_point_count',
+    'Counterbalances',
+    'counterbalances',
+    'displaced_com',
     'EffortProfile',
     'fit_oscillation',
     'flat_map',
@@ -95,6 +104,7 @@ __all__ = [
     'QuadraticCost',
     'Reason',
     'ReportedEstimate',
+    'remedy',
     'RequestRejected',
     'Residual',
     'rest_target',

@@ -261,7 +261,6 @@ def test_one_point_is_a_profile():
         ({'times': [0.5, 1.0]}, 'efforts'),
         ({'times': [], 'efforts': np.zeros((0, 1))}, 'm >= 1'),
         ({'efforts': [[2.0], [float('inf')], [0.0]]}, 'efforts must be finite'),
-        ({'efforts': [[2.0], [4.0], [1e-12]]}, 'last effort'),
         ({'efforts': [2.0, 4.0, 0.0]}, 'efforts'),
         ({'efforts': np.zeros((3, 0))}, 'efforts'),
         ({'positions': [[0.0], [0.0]]}, 'positions'),
