@@ -14,6 +14,7 @@ from flat_planner_ros.core.counterbalance import (
     displaced_com,
     remedy,
 )
+from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
@@ -24,6 +25,7 @@ from flat_planner_ros.core.errors import (
     NotFlat,
     UncertifiedPlan,
 )
+from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.goal import (
     check_point_count,
@@ -34,6 +36,7 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
@@ -68,6 +71,8 @@ __all__ = [
     'counterbalances',
     'displaced_com',
     'EffortProfile',
+    'Extrema',
+    'extrema_of',
     'fit_oscillation',
     'flat_map',
     'FlatMap',
@@ -80,9 +85,11 @@ __all__ = [
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
+    'JointLimits',
     'JointSample',
     'Law',
     'Level',
+    'LimitUse',
     'LinkBody',
     'MAX_WEIGHT',
     'ModelTuner',
@@ -91,6 +98,7 @@ __all__ = [
     'MotionLaw',
     'MotionRequest',
     'NaturalMode',
+    'NoFeasibleDuration',
     'NotFlat',
     'OscillationFit',
     'PacedArm',
@@ -102,6 +110,7 @@ __all__ = [
     'PlanningOptions',
     'PlanSamples',
     'QuadraticCost',
+    'Quantity',
     'Reason',
     'ReportedEstimate',
     'remedy',
@@ -112,6 +121,7 @@ __all__ = [
     'select',
     'Sensing',
     'SessionSettings',
+    'shortest_plan',
     'SimulatedArm',
     'SimulationSettings',
     'StartSource',
