@@ -62,7 +62,15 @@ MAY_IMPORT = {
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
     'moving_start': 'task unit_motion extremal solutions motion_law',
-    'planning': 'moving_start course task request plan_samples cost flatness arm errors',
+    # motions through via points
+    'segment_basis': 'solutions roots modes',
+    'coupling': 'segment_basis solutions errors',
+    'piecewise_law': 'motion_law',
+    'via_points': 'coupling segment_basis piecewise_law moving_start unit_motion extremal '
+    'solutions motion_law cost errors',
+    'via_times': 'via_points cost errors',
+    'planning': 'via_points moving_start solutions course task request plan_samples cost flatness '
+    'arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 
