@@ -22,6 +22,7 @@ MAY_IMPORT = {
     'errors': '',
     'links': 'errors',
     'arm': 'links errors',
+    'counterbalance': 'links errors',
     'link_bodies': 'links errors',
     # the plant
     'interpolation': '',

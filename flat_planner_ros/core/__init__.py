@@ -8,6 +8,12 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.counterbalance import (
+    Counterbalances,
+    counterbalances,
+    displaced_com,
+    remedy,
+)
 from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
@@ -93,8 +99,11 @@ __all__ = [
     'bodies_of_constants',
     'bodies_of_links',
     'check_point_count',
+    'counterbalances',
+    'Counterbalances',
     'Criterion',
     'DEFAULT_WEIGHT',
+    'displaced_com',
     'EffortProfile',
     'Ended',
     'Extrema',
@@ -135,8 +144,8 @@ __all__ = [
     'Outcome',
     'OutOfReach',
     'PacedArm',
-    'plan',
     'Plan',
+    'plan',
     'PlanarArm',
     'PlannedMotion',
     'PlannerSession',
@@ -149,6 +158,7 @@ __all__ = [
     'Quantity',
     'Reason',
     'rehearse',
+    'remedy',
     'ReportedEstimate',
     'RequestRejected',
     'Residual',
