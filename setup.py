@@ -69,6 +69,7 @@ setup(
             'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',
+            'tradeoff = flat_planner_ros.ros.tradeoff:main',
         ],
     },
     zip_safe=True,
