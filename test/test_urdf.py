@@ -1,5 +1,7 @@
 """The URDF is the planner's arm: in structure, and by the dynamics of two other libraries."""
 
+from pathlib import Path
+import re
 from xml.etree import ElementTree
 
 from flat_planner_ros.core import (
@@ -225,3 +227,20 @@ def test_link_names_never_clash_with_joint_names():
         joints=['shoulder', 'joint_2'], arm=description.arm, bodies=description.bodies
     )
     assert other.links == ['shoulder_link', 'link_2']
+
+
+def test_the_recipe_for_mujoco_works(tmp_path, monkeypatch):
+    mujoco = pytest.importorskip('mujoco')
+    text = (Path(__file__).resolve().parent.parent / 'docs' / 'real_robot.md').read_text('utf-8')
+    (recipe,) = re.findall(r'^```python\n(.*?)^```', text, re.MULTILINE | re.DOTALL)
+    description = describe(PAPER)
+    monkeypatch.chdir(tmp_path)
+    Path('arm.urdf').write_text(urdf_of(description), 'utf-8')
+    exec(compile(recipe, 'recipe', 'exec'), {})
+    model = mujoco.MjModel.from_xml_path('arm.xml')
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = [0.3, -0.2], [1.0, 2.0], [5e-3]
+    mujoco.mj_forward(model, data)
+    expected = description.arm.forward_dynamics(data.qpos, data.qvel, np.array([5e-3]))
+    assert np.allclose(data.qacc, expected, rtol=1e-4)  # its format has six digits
+    assert model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
