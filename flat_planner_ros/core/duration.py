@@ -31,6 +31,9 @@ AIM = 1.01
 FIRST_STRIDE = 1.1
 """Least ratio of a duration to the one tried before, if that was too short [-]."""
 
+DIGITS = 9
+"""Significant digits of the durations tried: as many as are reported."""
+
 POWERS = {Quantity.POSITION: 2.0, Quantity.VELOCITY: 1.0, Quantity.EFFORT: 2.0}
 """How the use of a limit falls with the duration of a fixed shape, to leading order."""
 
@@ -169,7 +172,9 @@ class _Search:
         return min((t for t in self._trials.values() if t.obeys), key=lambda t: t.duration)
 
     def _try(self, duration: float) -> _Trial:
-        """Return the trial of a duration."""
+        """Return the trial of a duration, rounded so that its usual text is exactly it."""
+        rounded = float(f'{duration:.{DIGITS}g}')
+        duration = min(max(rounded, self._shortest), self._longest)
         known = self._trials.get(duration)
         if known is not None:
             return known

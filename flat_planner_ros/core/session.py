@@ -8,12 +8,18 @@ from math import inf
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.timing import OnViolation, Timing
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+
+LONGEST_FOUND = 3600.0
+"""Longest duration that is looked for where the settings name none [s]."""
 
 
 class StartSource(Enum):
@@ -46,9 +52,13 @@ class SessionSettings:
     period
         Spacing of a motion's samples [s].
     default_duration
-        Duration of goals without times [s]; 0 where there is none.
+        Duration of goals without times [s]; 0 for the shortest within the limits.
     min_duration, max_duration
         Range of durations that are accepted [s].
+    limits
+        What the joints may do; None where nothing is limited.
+    on_violation
+        What becomes of durations that are too short for them.
     start_source
         Where motions start.
     start_position
@@ -71,6 +81,8 @@ class SessionSettings:
     default_duration: float = 0.0
     min_duration: float = 0.0
     max_duration: float = inf
+    limits: JointLimits | None = None
+    on_violation: OnViolation = OnViolation.REJECT
     start_source: StartSource = StartSource.AUTO
     start_position: tuple[float, ...] = ()
     position_tolerance: float = 0.01
@@ -91,6 +103,10 @@ class SessionSettings:
             raise InvalidRequest(
                 f'duration.max = {self.max_duration:g} s is below duration.min = '
                 f'{self.min_duration:g} s'
+            )
+        if self.limits is not None and len(self.limits.velocity) != self.arm.n:
+            raise InvalidRequest(
+                f'limits of {len(self.limits.velocity)} joints for an arm of {self.arm.n} joints'
             )
         if self.start_source is StartSource.PARAMETER:
             if len(self.start_position) != self.arm.n:
@@ -121,6 +137,10 @@ class Motion:
         Absolute time of its start [s].
     planned_at
         Absolute time at which it was accepted [s].
+    duration_min
+        Shortest duration within the limits, where it was looked for [s].
+    exceeded
+        What the prescribed duration would have exceeded, if the motion was stretched.
 
     """
 
@@ -129,6 +149,8 @@ class Motion:
     samples: PlanSamples
     start: float
     planned_at: float
+    duration_min: float | None = None
+    exceeded: LimitUse | None = None
 
     @property
     def end(self) -> float:
@@ -215,12 +237,17 @@ class PlannerSession:
         duration = self._checked_duration(target.duration)
         start_time = self._start_time(goal, now)
         self._refuse_if_busy(now)
-        start = self._start(now)
-        request = MotionRequest(
-            start=np.array(start), final=np.array(target.positions), duration=duration
-        )
+        start, final = np.array(self._start(now)), np.array(target.positions)
+        timing = self._timing(start)
+        timing.check_pose('the start', start)
+        timing.check_pose('the final', final)
+
+        def plan_of(duration: float) -> Plan:
+            request = MotionRequest(start=start, final=final, duration=duration)
+            return plan(request, settings.arm, settings.options)
+
         try:
-            planned = plan(request, settings.arm, settings.options)
+            timed = timing.timed(plan_of, duration)
         except UncertifiedPlan as error:
             raise RequestRejected(
                 Reason.ILL_CONDITIONED,
@@ -229,10 +256,16 @@ class PlannerSession:
                 value=error.residual,
                 limit=error.tolerance,
             ) from error
-        samples = planned.sample(settings.period)
+        samples = timed.plan.sample(settings.period)
         self._count += 1
         self._motion = Motion(
-            plan_id=self._count, plan=planned, samples=samples, start=start_time, planned_at=now
+            plan_id=self._count,
+            plan=timed.plan,
+            samples=samples,
+            start=start_time,
+            planned_at=now,
+            duration_min=timed.duration_min,
+            exceeded=timed.exceeded,
         )
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
         self._is_prompt = goal.stamp is None
@@ -259,16 +292,32 @@ class PlannerSession:
         self._running = False
         return self._motion
 
-    def _checked_duration(self, prescribed: float | None) -> float:
-        """Return the duration of a goal, within its range."""
+    def _timing(self, start: FloatArray) -> Timing:
+        """Return the rules for the duration of a motion from a pose."""
+        settings = self.settings
+        limits = settings.limits or JointLimits.of(settings.arm.n)
+        return Timing(
+            joints=settings.joints,
+            limits=limits.reaching(start, settings.position_tolerance),
+            on_violation=settings.on_violation,
+            # A motion shorter than the spacing of its samples would be none.
+            shortest=max(settings.min_duration, settings.period),
+            longest=min(settings.max_duration, LONGEST_FOUND),
+        )
+
+    def _checked_duration(self, prescribed: float | None) -> float | None:
+        """Return the duration of a goal, within its range; None for an automatic one."""
         settings = self.settings
         duration = settings.default_duration if prescribed is None else prescribed
         if duration == 0.0:
-            raise RequestRejected(
-                Reason.DURATION_OUT_OF_RANGE,
-                'the goal prescribes no duration, and automatic duration is not available in this '
-                'version: set time_from_start in the goal or the parameter duration.default',
-            )
+            if settings.limits is None or not settings.limits.bound_duration:
+                raise RequestRejected(
+                    Reason.DURATION_OUT_OF_RANGE,
+                    'the goal prescribes no duration, and no limit of a velocity or an effort '
+                    'makes one the shortest: set time_from_start in the goal, or one of the '
+                    'parameters duration.default, limits.velocity and limits.effort',
+                )
+            return None
         if not settings.min_duration <= duration <= settings.max_duration:
             below = duration < settings.min_duration
             limit = settings.min_duration if below else settings.max_duration
