@@ -8,6 +8,12 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.counterbalance import (
+    Counterbalances,
+    counterbalances,
+    displaced_com,
+    remedy,
+)
 from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
@@ -47,9 +53,16 @@ from flat_planner_ros.core.planning import (
 )
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import (
+    Ended,
+    Outcome,
+    PlannerSession,
+    SessionSettings,
+    StartSource,
+)
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.timeline import Motion, Track
 from flat_planner_ros.core.timing import OnViolation
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
@@ -62,7 +75,11 @@ __all__ = [
     'bodies_of_constants',
     'bodies_of_links',
     'check_point_count',
+    'Counterbalances',
+    'counterbalances',
+    'displaced_com',
     'EffortProfile',
+    'Ended',
     'Extrema',
     'extrema_of',
     'fit_oscillation',
@@ -94,6 +111,7 @@ __all__ = [
     'NotFlat',
     'OnViolation',
     'OscillationFit',
+    'Outcome',
     'PacedArm',
     'Plan',
     'plan',
@@ -106,6 +124,7 @@ __all__ = [
     'Quantity',
     'Reason',
     'ReportedEstimate',
+    'remedy',
     'RequestRejected',
     'Residual',
     'rest_target',
@@ -120,6 +139,7 @@ __all__ = [
     'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
+    'Track',
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',

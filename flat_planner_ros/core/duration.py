@@ -51,8 +51,9 @@ class NoFeasibleDuration(FlatPlannerError):
         Of that motion [s].
     shortest, longest
         The durations considered [s].
-    at_rest
-        Whether it is exceeded at rest already, by the static load.
+    at_end
+        Whether it is an effort beyond its limit at the start or the end already: a static load, or
+        that of the motion from which this one starts.
 
     """
 
@@ -62,7 +63,7 @@ class NoFeasibleDuration(FlatPlannerError):
         duration: float,
         shortest: float,
         longest: float,
-        at_rest: bool = False,
+        at_end: bool = False,
     ) -> None:
         """Keep the numbers, so that a caller can name the joint."""
         super().__init__(f'no duration from {shortest:g} to {longest:g} s obeys the limits')
@@ -70,7 +71,7 @@ class NoFeasibleDuration(FlatPlannerError):
         self.duration = duration
         self.shortest = shortest
         self.longest = longest
-        self.at_rest = at_rest
+        self.at_end = at_end
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -183,7 +184,7 @@ class _Search:
         except UncertifiedPlan:
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
-            self._refuse_static_load(plan)
+            self._refuse_ends(plan)
             uses = self._limits.uses(plan)
             worst = max(uses, key=lambda use: use.ratio, default=None)
             stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
@@ -250,11 +251,11 @@ class _Search:
             duration /= SCAN_STEP
         self._try(low)
 
-    def _refuse_static_load(self, plan: Plan) -> None:
-        """Refuse a motion that starts or ends with too large an effort, once."""
+    def _refuse_ends(self, plan: Plan) -> None:
+        """Refuse a motion that starts or ends with too large an effort; looked at once."""
         if self._trials or Quantity.EFFORT not in self._limits.quantities:
             return
-        use = self._limits.at_rest(plan)
+        use = self._limits.at_ends(plan)
         if use is not None:
             duration = plan.request.duration
             raise NoFeasibleDuration(use, duration, self._shortest, self._longest, True)

@@ -189,7 +189,7 @@ class JointLimits:
         """
         return max(self.uses(plan), key=lambda use: use.ratio, default=None)
 
-    def at_rest(self, plan: Plan) -> LimitUse | None:
+    def at_ends(self, plan: Plan) -> LimitUse | None:
         """Return an effort beyond its limit at an end of a plan, which no duration changes."""
         ends = np.array([0.0, plan.request.duration])
         for time, efforts in zip(ends.tolist(), plan.at(ends).efforts, strict=True):

@@ -149,12 +149,12 @@ class Timing:
                     f'no duration from {shortest:g} to {self.longest:g} s has a plan to the '
                     f'promised accuracy; use smaller weights',
                 ) from error
-            if error.at_rest:
-                end = 'start' if error.use.time == 0.0 else 'final pose'
+            if error.at_end:
+                where = 'at the start' if error.use.time == 0.0 else 'at rest in the final pose'
                 name = self.joints[error.use.joint]
                 why = (
-                    f'the static load of {name} in the {end}, {error.use.value:.6g} N m, exceeds '
-                    f'its effort limit {abs(error.use.limit):.6g} N m at any duration'
+                    f'the effort of {name} {where} is {error.use.value:.6g} N m at any duration, '
+                    f'beyond the limit {error.use.limit:.6g} N m'
                 )
                 raise self._rejection(error.use, why) from error
             why = '' if exceeded is None else f'{self._sentence(exceeded)}; '

@@ -13,7 +13,13 @@ from math import inf, isfinite, isnan
 import sys
 from typing import Any, Generic, TypeVar
 
-from flat_planner_ros.core import FlatPlannerError, PlanarArm
+from flat_planner_ros.core import (
+    displaced_com,
+    FlatPlannerError,
+    NotFlat,
+    PlanarArm,
+    remedy,
+)
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
@@ -253,9 +259,18 @@ EXAMPLE_ARM: Values = {
 """The paper's arm, for nodes that are started without any model (config/arm_2dof.yaml)."""
 
 
-def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
+def arm_of(
+    values: Values, imbalance: Sequence[float] = (0.0, 0.0)
+) -> tuple[tuple[str, ...], PlanarArm]:
     """
-    Return the joint names and the nominal model.
+    Return the joint names and the arm.
+
+    Parameters
+    ----------
+    values
+        The nominal model.
+    imbalance
+        What the last two links of the true arm lack of balance, as for `displaced_com` [kg m].
 
     Raises
     ------
@@ -301,7 +316,19 @@ def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
         arm = PlanarArm.from_links(**links, **common)
     if arm.n != len(joints):
         raise InvalidParameter(f'{len(joints)} joints are named, but the model has {arm.n}')
-    arm.check_flat()
+    try:
+        arm.check_flat()
+    except NotFlat as error:
+        mended = remedy(**{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'})
+        raise NotFlat(error.link, error.static_moment, f'{error}; {mended}') from error
+    if any(imbalance):
+        if reduced:
+            raise InvalidParameter(
+                'an imbalance needs the model in its full form: the reduced one does not know '
+                'the masses of the last two links'
+            )
+        com = displaced_com(links['link_com'], links['link_mass'], imbalance)
+        arm = PlanarArm.from_links(**{**links, 'link_com': com}, **common)
     return joints, arm
 
 

@@ -31,21 +31,23 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
-    include_passive_joint, include_effort, absolute_stamp
+    include_passive_joint, include_effort
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
+    stream_effort
+        Whether `~/effort_commands` is published.
 
     """
 
     session: SessionSettings
     include_passive_joint: bool
     include_effort: bool
-    absolute_stamp: bool
     reference_rate: float
     auto_tune: bool
+    stream_effort: bool
 
 
 LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
@@ -170,6 +172,13 @@ ROWS = [
         lower=0.0,
     ),
     Row(
+        name='replan.lookahead',
+        default=0.1,
+        description='from accepting a goal while the arm moves to the start of its motion [s]',
+        lower=0.01,
+        upper=10.0,
+    ),
+    Row(
         name='execute',
         default=True,
         description='publish commands; false = plan and report only',
@@ -206,7 +215,7 @@ ROWS = [
     Row(
         name='stream_effort',
         default=False,
-        description='stream ~/effort_commands; not yet available',
+        description='publish ~/effort_commands every sampling.period while the arm moves',
     ),
 ]
 """All parameters of the planner node."""
@@ -222,7 +231,6 @@ def build(values: Values) -> PlannerSettings:
         They contradict each other, or ask for what this version does not have.
 
     """
-    _refuse_unavailable(values)
     joints, arm = arm_of(values)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
@@ -256,15 +264,17 @@ def build(values: Values) -> PlannerSettings:
         velocity_tolerance=values['start.velocity_tolerance'],
         measurement_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
+        lookahead=values['replan.lookahead'],
+        is_stamped=values['command.stamp'] == 'absolute',
         execute=values['execute'],
     )
     return PlannerSettings(
         session=session,
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
-        absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
+        stream_effort=values['stream_effort'],
     )
 
 
@@ -289,9 +299,3 @@ def _custom_cost(values: Values) -> np.ndarray | None:
     matrix = np.reshape(numbers, (side, side) if side**2 == len(numbers) else -1)
     # Refused now if it is inadmissible, even while another strategy is in use.
     return QuadraticCost(matrix=matrix).matrix
-
-
-def _refuse_unavailable(values: Values) -> None:
-    """Refuse what a later version will do, rather than ignore it."""
-    if values['stream_effort']:
-        raise InvalidParameter('stream_effort is not available in this version, set it to false')

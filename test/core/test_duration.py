@@ -238,7 +238,7 @@ def test_a_load_on_the_way_that_no_duration_lifts_is_refused_with_its_number():
     assert (use.joint, use.quantity, abs(use.limit)) == (0, Quantity.EFFORT, 5.2)
     assert 5.3 <= abs(use.value) < 5.35
     assert 1.2 < refusal.value.duration < 2.2
-    assert not refusal.value.at_rest
+    assert not refusal.value.at_end
 
 
 def test_a_load_at_rest_is_refused_at_once():
@@ -251,7 +251,7 @@ def test_a_load_at_rest_is_refused_at_once():
 
     with pytest.raises(NoFeasibleDuration) as refusal:
         shortest_plan(motion, JointLimits.of(3, effort=[2.0, inf, inf]), **RANGE)
-    assert refusal.value.at_rest
+    assert refusal.value.at_end
     assert len(tried) == 1
     held = arm.gravity_effort(np.array([0.0, 1.0, 0.0]))[0]
     assert refusal.value.use.value == pytest.approx(held, rel=1e-9)

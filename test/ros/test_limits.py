@@ -99,8 +99,8 @@ def test_a_motion_too_fast_is_refused_with_numbers_that_can_be_used(graph):
 
 
 def test_a_velocity_limit_has_its_own_code(graph):
-    planner = Planner(graph, **{'limits.velocity': [5.0, inf]})
-    status, values = planner.send(duration=1.0)
+    planner = Planner(graph, **{'limits.velocity': [4.5, inf]})
+    status, values = planner.send(duration=1.1)
     assert (values['error_name'], values['error_code']) == ('VELOCITY_LIMIT', '-111')
     assert 'rad/s' in status.message
 
