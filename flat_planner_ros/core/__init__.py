@@ -23,6 +23,7 @@ from flat_planner_ros.core.errors import (
     InvalidModel,
     InvalidRequest,
     NotFlat,
+    OutOfReach,
     UncertifiedPlan,
 )
 from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
@@ -36,6 +37,14 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.insensitive import least_effort, rehearse
+from flat_planner_ros.core.insensitivity import (
+    Criterion,
+    DEFAULT_WEIGHT,
+    Insensitivity,
+    MAX_INSENSITIVITY,
+    Nominal,
+)
 from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
@@ -51,6 +60,12 @@ from flat_planner_ros.core.planning import (
     PlanSamples,
     ViaPoint,
 )
+from flat_planner_ros.core.robustness import (
+    MAX_HALF_WIDTH,
+    predict_residual,
+    PredictedResidual,
+    UncertaintyBox,
+)
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import (
@@ -60,10 +75,18 @@ from flat_planner_ros.core.session import (
     SessionSettings,
     StartSource,
 )
+from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
 from flat_planner_ros.core.timeline import Motion, Track
 from flat_planner_ros.core.timing import OnViolation
+from flat_planner_ros.core.tradeoff import (
+    advice,
+    baselines,
+    predicted_residual,
+    tradeoff,
+    TradeoffPoint,
+)
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -71,12 +94,16 @@ __all__ = [
     'ActuatedJoints',
     'Adoption',
     'AdoptionRefused',
+    'advice',
     'ArmState',
+    'baselines',
     'bodies_of_constants',
     'bodies_of_links',
     'check_point_count',
-    'Counterbalances',
     'counterbalances',
+    'Counterbalances',
+    'Criterion',
+    'DEFAULT_WEIGHT',
     'displaced_com',
     'EffortProfile',
     'Ended',
@@ -90,6 +117,7 @@ __all__ = [
     'Goal',
     'GoalPoint',
     'identify',
+    'Insensitivity',
     'InvalidCommand',
     'InvalidCost',
     'InvalidModel',
@@ -97,9 +125,12 @@ __all__ = [
     'JointLimits',
     'JointSample',
     'Law',
+    'least_effort',
     'Level',
     'LimitUse',
     'LinkBody',
+    'MAX_HALF_WIDTH',
+    'MAX_INSENSITIVITY',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
@@ -108,10 +139,12 @@ __all__ = [
     'MotionRequest',
     'NaturalMode',
     'NoFeasibleDuration',
+    'Nominal',
     'NotFlat',
     'OnViolation',
     'OscillationFit',
     'Outcome',
+    'OutOfReach',
     'PacedArm',
     'Plan',
     'plan',
@@ -120,11 +153,15 @@ __all__ = [
     'PlannerSession',
     'PlanningOptions',
     'PlanSamples',
+    'predict_residual',
+    'predicted_residual',
+    'PredictedResidual',
     'QuadraticCost',
     'Quantity',
     'Reason',
-    'ReportedEstimate',
+    'rehearse',
     'remedy',
+    'ReportedEstimate',
     'RequestRejected',
     'Residual',
     'rest_target',
@@ -132,6 +169,8 @@ __all__ = [
     'select',
     'Sensing',
     'SessionSettings',
+    'shaped_quintic',
+    'Shaper',
     'shortest_plan',
     'SimulatedArm',
     'SimulationSettings',
@@ -140,8 +179,11 @@ __all__ = [
     'Strategy',
     'strategy_cost',
     'Track',
+    'tradeoff',
+    'TradeoffPoint',
+    'UncertaintyBox',
     'UncertifiedPlan',
+    'ViaPoint',
     'VibrationMonitor',
     'VibrationReport',
-    'ViaPoint',
 ]

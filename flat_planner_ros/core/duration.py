@@ -11,7 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isfinite, log, sqrt
 
-from flat_planner_ros.core.errors import FlatPlannerError, InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import (
+    FlatPlannerError,
+    InvalidRequest,
+    OutOfReach,
+    UncertifiedPlan,
+)
 from flat_planner_ros.core.extrema import Quantity
 from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning import Plan
@@ -45,8 +50,7 @@ class NoFeasibleDuration(FlatPlannerError):
     Attributes
     ----------
     use
-        The limit that is exceeded even by the least exceeding motion; None if no law could be
-        computed at all.
+        The limit that is exceeded even by the least exceeding motion.
     duration
         Of that motion [s].
     shortest, longest
@@ -59,7 +63,7 @@ class NoFeasibleDuration(FlatPlannerError):
 
     def __init__(
         self,
-        use: LimitUse | None,
+        use: LimitUse,
         duration: float,
         shortest: float,
         longest: float,
@@ -133,6 +137,8 @@ def shortest_plan(
         The range is empty or not finite.
     NoFeasibleDuration
         No duration on a grid of ratio `SCAN_STEP` over the whole range obeys the limits.
+    FlatPlannerError
+        As `plan_of` raises it, if there is no plan of any duration on that grid.
 
     """
     if not (0.0 < shortest <= longest and isfinite(longest)):
@@ -154,6 +160,7 @@ class _Search:
         self._plan_of, self._limits = plan_of, limits
         self._shortest, self._longest = shortest, longest
         self._trials: dict[float, _Trial] = {}
+        self._failure: FlatPlannerError | None = None
 
     def run(self) -> Plan:
         """Return the shortest plan found."""
@@ -181,7 +188,8 @@ class _Search:
             return known
         try:
             plan = self._plan_of(duration)
-        except UncertifiedPlan:
+        except (UncertifiedPlan, OutOfReach) as error:
+            self._failure = error
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
             self._refuse_ends(plan)
@@ -257,12 +265,14 @@ class _Search:
             return
         use = self._limits.at_ends(plan)
         if use is not None:
-            duration = plan.request.duration
-            raise NoFeasibleDuration(use, duration, self._shortest, self._longest, True)
+            raise NoFeasibleDuration(use, plan.duration, self._shortest, self._longest, True)
 
     def _refuse_if_none(self) -> None:
         """Refuse if no trial obeys."""
-        trials = self._trials.values()
-        if not any(trial.obeys for trial in trials):
-            least = min(trials, key=lambda trial: trial.ratio)
+        least = min(self._trials.values(), key=lambda trial: trial.ratio)
+        if least.obeys:
+            return
+        if least.worst is not None:
             raise NoFeasibleDuration(least.worst, least.duration, self._shortest, self._longest)
+        if self._failure is not None:
+            raise self._failure

@@ -7,7 +7,7 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
@@ -380,6 +380,10 @@ class PlannerSession:
         timing.check_pose('the final', final)
         try:
             return timing.timed(plan_of, duration)
+        except OutOfReach as error:
+            raise RequestRejected(
+                Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
+            ) from error
         except UncertifiedPlan as error:
             raise RequestRejected(
                 Reason.ILL_CONDITIONED,

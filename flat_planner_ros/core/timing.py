@@ -117,8 +117,8 @@ class Timing:
         ------
         RequestRejected
             No duration obeys the limits, or the prescribed one does not.
-        UncertifiedPlan
-            There is no plan of the prescribed duration.
+        FlatPlannerError
+            There is no plan of the prescribed duration, or of any.
 
         """
         if duration is None:
@@ -143,12 +143,6 @@ class Timing:
         try:
             return shortest_plan(plan_of, self.limits, shortest=shortest, longest=self.longest)
         except NoFeasibleDuration as error:
-            if error.use is None:
-                raise RequestRejected(
-                    Reason.ILL_CONDITIONED,
-                    f'no duration from {shortest:g} to {self.longest:g} s has a plan to the '
-                    f'promised accuracy; use smaller weights',
-                ) from error
             if error.at_end:
                 where = 'at the start' if error.use.time == 0.0 else 'at rest in the final pose'
                 name = self.joints[error.use.joint]

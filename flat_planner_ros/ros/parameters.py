@@ -124,7 +124,7 @@ class Row:
             is_number = isfinite(number) or (self.infinite and not isnan(number))
             if not (is_number and self.lower <= number <= self.upper):
                 raise InvalidParameter(
-                    f'{self.name} must be {self.constraints or "finite"}, got {number:g}'
+                    f'{self.name} must be {self.constraints or "finite"}, got {number}'
                 )
 
 
@@ -366,7 +366,7 @@ def _declare(node: Node, row: Row, default: Any) -> None:
         node.declare_parameter(row.name, default, row.descriptor())
     except InvalidParameterValueException as error:
         value = node._parameter_overrides[row.name].value
-        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value:g}') from error
+        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value}') from error
     except InvalidParameterTypeException as error:
         raise wrong_type(row, node._parameter_overrides[row.name].value) from error
 

@@ -268,11 +268,10 @@ def test_a_law_without_certificate_is_no_answer(paper_arm):
 
     found = shortest_plan(certified_above, JointLimits.of(2, effort=[1e3, inf]), **RANGE)
     assert 0.7 <= found.duration <= 0.7 * (1.0 + DURATION_TOLERANCE)
-    with pytest.raises(NoFeasibleDuration) as refusal:
+    with pytest.raises(UncertifiedPlan):
         shortest_plan(
             lambda t: certified_above(t, inf), JointLimits.of(2, effort=[1.0, inf]), **RANGE
         )
-    assert refusal.value.use is None
 
 
 @pytest.mark.parametrize('span', [(0.0, 1.0), (2.0, 1.0), (1.0, inf)])

@@ -4,7 +4,6 @@ from math import inf, pi
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
-from flat_planner_ros.core.errors import UncertifiedPlan
 from flat_planner_ros.core.extrema import extrema_of, Quantity
 from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
 from flat_planner_ros.core.limits import JointLimits
@@ -141,15 +140,6 @@ def test_a_static_load_is_named_as_such():
             )
         assert refusal.value.reason is Reason.EFFORT_LIMIT
         assert refusal.value.value == pytest.approx(5.886, rel=1e-3)
-
-
-def test_no_law_at_all_is_ill_conditioned():
-    def plan_of(duration):
-        raise UncertifiedPlan('boundary residual', 1.0, 1e-9)
-
-    with pytest.raises(RequestRejected) as refusal:
-        timing(JointLimits.of(2, effort=[EFFORT, inf])).timed(plan_of, None)
-    assert refusal.value.reason is Reason.ILL_CONDITIONED
 
 
 def test_poses_outside_the_range_are_refused_and_named():
