@@ -413,13 +413,13 @@ class PlanarArm:
         if self._has_friction:
             net[..., :-1] -= self.friction(dq)
         if self._inverse_mass is not None:
-            if self._has_weight:
+            if self.has_weight:
                 net -= self.gravity_effort(q)
             return _row(net, self._inverse_mass)
         theta = q.cumsum(axis=-1)
         apart = _apart(theta)
         load = _row(net, self._difference) - self._centrifugal(apart, dq)
-        if self._has_weight:
+        if self.has_weight:
             load -= self._weight(theta)
         return _row(_solve(self._link_inertia(apart), load), self._difference.T)
 
@@ -492,7 +492,8 @@ class PlanarArm:
         return bool(self.viscous_friction.any() or self.coulomb_friction.any())
 
     @cached_property
-    def _has_weight(self) -> bool:
+    def has_weight(self) -> bool:
+        """Whether gravity moves the arm, so that it takes efforts to keep it at rest."""
         return self.gravity != 0.0 and bool(self.static_moment.any())
 
 

@@ -21,7 +21,7 @@ class Drives:
     Parameters
     ----------
     arm
-        What they move; may be replaced.
+        What they move.
     saturation
         Largest effort of each motor, shape (n-1,) [N m]; unlimited by default.
     feedback_p, feedback_d
@@ -51,24 +51,15 @@ class Drives:
         self._is_limited = bool(np.isfinite(self._saturation).any())
         self.has_feedback = bool(self._feedback_p.any() or self._feedback_d.any())
         self.arm = arm
+        """What they move; may be replaced."""
         nothing, missing = np.zeros(motors), np.full(motors, np.nan)
         self.idle = JointReference(nothing, missing, missing)
         """What stands for no command; its arrays are known by being these very ones."""
 
-    @property
-    def arm(self) -> PlanarArm:
-        """Return what they move."""
-        return self._arm
-
-    @arm.setter
-    def arm(self, arm: PlanarArm) -> None:
-        self._arm = arm
-        self.has_weight = arm.gravity != 0.0 and bool(arm.static_moment.any())
-
     def feed_forward(self, reference: JointReference, q: Array) -> Array:
         """Return what is applied without looking at errors, shape (n-1,) [N m]."""
-        if self.has_weight and reference.effort is self.idle.effort:
-            return self._arm.gravity_effort(q)[:-1]
+        if self.arm.has_weight and reference.effort is self.idle.effort:
+            return self.arm.gravity_effort(q)[:-1]
         return reference.effort
 
     def asked(self, reference: JointReference, q: Array, dq: Array) -> Array:

@@ -7,7 +7,7 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
@@ -348,6 +348,10 @@ class PlannerSession:
             options = replace(options, flat_model=origin.before.plan.options.flat_model)
         try:
             return plan(request, arm, options)
+        except OutOfReach as error:
+            raise RequestRejected(
+                Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
+            ) from error
         except UncertifiedPlan as error:
             raise RequestRejected(
                 Reason.ILL_CONDITIONED,

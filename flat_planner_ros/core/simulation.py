@@ -60,8 +60,9 @@ class SimulatedArm:
     The true arm: its full dynamics, integrated in fixed Runge-Kutta steps of fourth order.
 
     Time lies on a grid: the start plus a whole number of steps, so that it never drifts. An arm
-    that runs away, beyond MAX_SPEED, is stopped where it is until it is reset. Before the first
-    point of its first command and after the last point of any, its motors carry its weight alone.
+    that runs away, beyond MAX_SPEED, is stopped where it is until it is reset. An arm that gravity
+    would move has brakes: it stands while there is no command, and until its first one starts.
+    After the last point of a command its motors carry its weight where it is, and nothing else.
 
     Parameters
     ----------
@@ -190,17 +191,19 @@ class SimulatedArm:
         drives, present = self._drives, self._reference(now)
         if drives.has_feedback and profile.positions is None:
             raise InvalidCommand('feedback needs a command with positions')
-        if profile.efforts[-1].any() and not drives.has_weight:
+        if profile.efforts[-1].any() and not self.arm.has_weight:
+            # Nobody could know when to let go, and a ramp to zero would be another motion.
             raise InvalidCommand(
                 f'the last effort must be 0 N m, got {profile.efforts[-1]}: the arm has no weight '
                 'that it could hold'
             )
         # What holds an arm up before the start is where it is, not what a model says of it.
-        is_carried = drives.has_weight and present.effort is drives.idle.effort
+        is_carried = self.arm.has_weight and present.effort is drives.idle.effort
         self._idle_until = profile.start + float(profile.times[0]) if is_carried else -inf
-        effort = drives.feed_forward(present, self._position)
-        self.release()
-        self._profile = profile.taken_over(now, effort)
+        if self._is_braked:
+            self._braked_until = profile.start
+        self._profile = profile.taken_over(now, drives.feed_forward(present, self._position))
+        self._held, self._held_until = drives.idle, inf
 
     def hold(self, effort: npt.ArrayLike, until: float = inf) -> None:
         """
@@ -225,12 +228,15 @@ class SimulatedArm:
         if held.shape != (self.arm.n - 1,):
             raise InvalidCommand(f'effort must have {self.arm.n - 1} entries, got {held.shape}')
         check_bound('effort', held, MAX_EFFORT, 'N m')
-        self._profile = None
+        self._profile, self._braked_until = None, -inf
         self._held, self._held_until = self._drives.idle._replace(effort=held), until
 
     def release(self) -> None:
-        """Apply nothing until the next command, but for what carries the weight."""
+        """Apply nothing until the next command; an arm with weight stands by its brakes."""
         self._profile, self._held, self._held_until = None, self._drives.idle, inf
+        self._braked_until = self._idle_until = -inf
+        if self.arm.has_weight:
+            self._braked_until, self._velocity = inf, np.zeros(self.arm.n)
 
     def take_expired(self) -> bool:
         """Return whether a held effort other than zero has ended, and forget that it has."""
@@ -261,8 +267,18 @@ class SimulatedArm:
             reference = self._advance_once(reference)
         return steps
 
+    @property
+    def _is_braked(self) -> bool:
+        """Whether brakes hold the arm in the step from now on."""
+        return self.time < self._braked_until - GRID_TOLERANCE * self._step
+
     def _advance_once(self, start: JointReference) -> JointReference:
         """Take one step; return the reference at its end, where the next step starts."""
+        if self._braked_until != -inf:
+            if self._is_braked:
+                self._count += 1
+                return self._reference(self.time)
+            self._braked_until = -inf
         h, q, dq = self._step, self._position, self._velocity
         middle = self._reference(self._origin + (self._count + 0.5) * h)
         self._count += 1

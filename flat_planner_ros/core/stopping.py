@@ -2,7 +2,7 @@
 Stopping: the motion that brings a moving arm to rest early, wherever that is easiest.
 
 The final pose is free. Where the cost is least, the momentum that belongs to the value of each
-planned variable is zero at the end ((62) of docs/derivation.md); it is linear in the final value,
+planned variable is zero at the end ((S2) of docs/derivation.md); it is linear in the final value,
 so that two laws tell where that is.
 """
 

@@ -4,7 +4,7 @@ Timeline: the motions that are still to be carried out, and the one command that
 A goal replaces whatever was planned from its start on. The start of the new motion is the state
 that the old one plans for that time, so that the effort has no step, and what is left of the old
 one until then is sent along with the new one: an executor that skips past points cannot notice the
-seam (docs/derivation.md, section 9).
+seam (docs/derivation.md, section S).
 """
 
 from collections.abc import Sequence
