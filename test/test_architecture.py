@@ -67,9 +67,9 @@ MAY_IMPORT = {
     'piecewise_law': 'motion_law',
     'via_points': 'coupling segment_basis piecewise_law moving_start unit_motion extremal '
     'solutions motion_law cost errors',
-    'via_times': 'via_points cost errors',
-    'planning': 'via_points moving_start solutions course task request plan_samples cost flatness '
-    'arm errors',
+    'via_times': 'via_points task request solutions cost arm errors',
+    'planning': 'via_times via_points moving_start solutions course task request plan_samples '
+    'cost flatness arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

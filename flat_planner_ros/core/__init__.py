@@ -50,6 +50,7 @@ from flat_planner_ros.core.sensing import Sensing
 from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.via_times import with_via_times
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -122,4 +123,5 @@ __all__ = [
     'VibrationMonitor',
     'VibrationReport',
     'ViaPoint',
+    'with_via_times',
 ]
