@@ -61,12 +61,12 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'planner_node = flat_planner_ros.ros.planner_node:main',
-            'plant_node = flat_planner_ros.ros.plant_node:main',
-            'monitor_node = flat_planner_ros.ros.monitor_node:main',
+            'planner_node = flat_planner_ros.programs:planner_node',
+            'plant_node = flat_planner_ros.programs:plant_node',
+            'monitor_node = flat_planner_ros.programs:monitor_node',
             'record = flat_planner_ros.ros.record:main',
             'analyse = flat_planner_ros.ros.analyse:main',
-            'demo = flat_planner_ros.ros.demo:main',
+            'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',
         ],

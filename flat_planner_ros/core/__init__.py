@@ -47,9 +47,16 @@ from flat_planner_ros.core.planning import (
 )
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import (
+    Ended,
+    Outcome,
+    PlannerSession,
+    SessionSettings,
+    StartSource,
+)
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.timeline import Motion, Track
 from flat_planner_ros.core.via_times import with_via_times
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
@@ -63,6 +70,7 @@ __all__ = [
     'bodies_of_links',
     'check_point_count',
     'EffortProfile',
+    'Ended',
     'Extrema',
     'extrema_of',
     'fit_oscillation',
@@ -93,6 +101,7 @@ __all__ = [
     'NoFeasibleDuration',
     'NotFlat',
     'OscillationFit',
+    'Outcome',
     'PacedArm',
     'Plan',
     'plan',
@@ -119,6 +128,7 @@ __all__ = [
     'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
+    'Track',
     'UncertifiedPlan',
     'VibrationMonitor',
     'VibrationReport',

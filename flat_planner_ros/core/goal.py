@@ -158,6 +158,11 @@ class RestTarget(NamedTuple):
     duration: float | None
     via: tuple[Waypoint, ...] = ()
 
+    @property
+    def chooses_times(self) -> bool:
+        """Whether there are via points whose times the planner is to choose."""
+        return bool(self.via) and self.duration is None
+
 
 def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
     """

@@ -6,10 +6,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.core import (
     ActuatedJoints,
     Adoption,
+    Ended,
     Goal,
     InvalidRequest,
     Level,
     Motion,
+    Outcome,
     ReportedEstimate,
     RequestRejected,
     StiffnessEstimate,
@@ -31,6 +33,13 @@ LEVELS = {
     Level.STALE: DiagnosticStatus.STALE,
 }
 """Levels of a report as diagnostics state them."""
+
+ENDINGS = {
+    Outcome.FINISHED: 'has come to its end',
+    Outcome.STOPPED: 'has been brought to rest on the way',
+    Outcome.PREEMPTED: 'is replaced by a later goal',
+}
+"""What a verdict says of each end of a motion."""
 
 Values = Mapping[str, float | int | str | None]
 """Keys and values of a status; None for what is not known."""
@@ -106,10 +115,11 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
     return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
 
 
-def finished_status(motion: Motion) -> DiagnosticStatus:
-    """Return the notice that a motion has come to its planned end."""
-    message = f'plan {motion.plan_id} finished after {motion.plan.request.duration:g} s'
-    values = _of_motion(motion, 'FINISHED')
+def ended_status(ended: Ended) -> DiagnosticStatus:
+    """Return the notice that a motion has ended, and how."""
+    motion, outcome = ended
+    message = f'plan {motion.plan_id} {ENDINGS[outcome]}'
+    values = _of_motion(motion, outcome.value)
     return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
 
 

@@ -28,21 +28,23 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
-    include_passive_joint, include_effort, absolute_stamp
+    include_passive_joint, include_effort
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
+    stream_effort
+        Whether `~/effort_commands` is published.
 
     """
 
     session: SessionSettings
     include_passive_joint: bool
     include_effort: bool
-    absolute_stamp: bool
     reference_rate: float
     auto_tune: bool
+    stream_effort: bool
 
 
 ROWS = [
@@ -158,6 +160,13 @@ ROWS = [
         lower=0.0,
     ),
     Row(
+        name='replan.lookahead',
+        default=0.1,
+        description='from accepting a goal while the arm moves to the start of its motion [s]',
+        lower=0.01,
+        upper=10.0,
+    ),
+    Row(
         name='execute',
         default=True,
         description='publish commands; false = plan and report only',
@@ -194,7 +203,7 @@ ROWS = [
     Row(
         name='stream_effort',
         default=False,
-        description='stream ~/effort_commands; not yet available',
+        description='publish ~/effort_commands every sampling.period while the arm moves',
     ),
 ]
 """All parameters of the planner node."""
@@ -242,15 +251,17 @@ def build(values: Values) -> PlannerSettings:
         velocity_tolerance=values['start.velocity_tolerance'],
         measurement_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
+        lookahead=values['replan.lookahead'],
+        is_stamped=values['command.stamp'] == 'absolute',
         execute=values['execute'],
     )
     return PlannerSettings(
         session=session,
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
-        absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
+        stream_effort=values['stream_effort'],
     )
 
 
@@ -267,8 +278,6 @@ def _custom_cost(values: Values) -> np.ndarray | None:
 
 def _refuse_unavailable(values: Values) -> None:
     """Refuse what a later version will do, rather than ignore it."""
-    if values['stream_effort']:
-        raise InvalidParameter('stream_effort is not available in this version, set it to false')
     for name, value in values.items():
         if name.startswith('limits.') and not all(abs(number) == inf for number in value):
             raise InvalidParameter(
