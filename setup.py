@@ -68,6 +68,7 @@ setup(
             'analyse = flat_planner_ros.ros.analyse:main',
             'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
+            'flat_plan = flat_planner_ros.ros.flat_plan:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',
         ],
     },

@@ -6,10 +6,10 @@ from math import ceil, inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.cost import QuadraticCost
+from flat_planner_ros.core.cost import QuadraticCost, Strategy
 from flat_planner_ros.core.course import Course, FreeCourse, Law, RestToRest
 from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
-from flat_planner_ros.core.flatness import apply_row, FlatMap
+from flat_planner_ros.core.flatness import apply_row, FlatMap, FlatModel
 from flat_planner_ros.core.moving_start import laws_to_rest
 from flat_planner_ros.core.plan_samples import PlanSamples
 from flat_planner_ros.core.request import (
@@ -18,6 +18,7 @@ from flat_planner_ros.core.request import (
     PlanningOptions,
     ViaPoint,
 )
+from flat_planner_ros.core.shaped_course import shaped_course
 from flat_planner_ros.core.task import fractions, Task, task_of
 from flat_planner_ros.core.via_points import optimal_path
 from flat_planner_ros.core.via_times import path_of
@@ -225,6 +226,8 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
         The arm does not meet the flatness condition.
     UncertifiedPlan
         The law cannot be computed to the promised accuracy in double precision.
+    OutOfReach
+        No motion meets a bound of the strategy `insensitive`.
 
     """
     _check_fit(request, arm)
@@ -247,16 +250,21 @@ def _from_rest(request: MotionRequest, options: PlanningOptions, task: Task) -> 
     )
     if not all([abs(distance) < task.reach for distance in distances]):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
+    course: Course = RestToRest(task=task, start=start, final=final, distances=distances)
     moves = any(distances)
     boundary = task.unit.boundary_residual if moves else 0.0
     optimality = task.unit.optimality_residual if moves else 0.0
+    if options.strategy is Strategy.INSENSITIVE and distances[0]:
+        if options.flat_model is not FlatModel.EXACT:
+            raise InvalidRequest('strategy insensitive needs flat_model exact')
+        course, boundary, optimality = shaped_course(task, options.insensitivity, start, final)
     _certify('boundary residual', boundary, BOUNDARY_TOLERANCE)
     _certify('optimality residual', optimality, OPTIMALITY_TOLERANCE)
     return Plan(
         request=request,
         options=options,
         task=task,
-        course=RestToRest(task=task, start=start, final=final, distances=distances),
+        course=course,
         boundary_residual=boundary,
         optimality_residual=optimality,
     )
@@ -285,6 +293,8 @@ def _from_motion(
 
 def _through_points(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
     """Return a plan whose flat outputs pass given values on the way."""
+    if options.strategy is Strategy.INSENSITIVE:
+        raise InvalidRequest('strategy insensitive has no via points; another strategy has')
     path = path_of(request, task)
     found = optimal_path(task.cost, path)
     _certify('boundary residual', found.boundary_residual, BOUNDARY_TOLERANCE)

@@ -7,7 +7,7 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target, RestTarget
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
@@ -346,6 +346,10 @@ class PlannerSession:
             if chooses_times:
                 request = with_via_times(request, arm, options)
             return plan(request, arm, options)
+        except OutOfReach as error:
+            raise RequestRejected(
+                Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
+            ) from error
         except UncertifiedPlan as error:
             raise RequestRejected(
                 Reason.ILL_CONDITIONED,

@@ -197,7 +197,14 @@ class PlannerNode(Node):
             elapsed = perf_counter() - started
             # The verdict's peaks take a while: the plant need not wait for them.
             self._publish_motion()
-            status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)
+            status = diagnostics.accepted_status(
+                motion,
+                goal,
+                self._joints,
+                elapsed,
+                with_advice=self._settings.report_advice,
+                with_baselines=self._settings.report_baselines,
+            )
         self._publish_status(status)
         self._report_ended()
         return status

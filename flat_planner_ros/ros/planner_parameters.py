@@ -9,11 +9,13 @@ from flat_planner_ros.core import (
     MAX_WEIGHT,
     PlanningOptions,
     QuadraticCost,
+    rehearse,
     SessionSettings,
     StartSource,
     Strategy,
     strategy_cost,
 )
+from flat_planner_ros.ros.insensitivity_parameters import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
 import numpy as np
 from rclpy.parameter import Parameter
@@ -34,6 +36,8 @@ class PlannerSettings:
         Rate of `~/reference` [Hz].
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
+    report_advice, report_baselines
+        What the verdict on a goal says besides.
     stream_effort
         Whether `~/effort_commands` is published.
 
@@ -44,6 +48,8 @@ class PlannerSettings:
     include_effort: bool
     reference_rate: float
     auto_tune: bool
+    report_advice: bool
+    report_baselines: bool
     stream_effort: bool
 
 
@@ -74,6 +80,7 @@ ROWS = [
         default=Parameter.Type.DOUBLE_ARRAY,
         description='36 numbers, row by row: the cost of the strategy custom',
     ),
+    *INSENSITIVITY_ROWS,
     Row(
         name='flat_model',
         default=FlatModel.EXACT.value,
@@ -201,6 +208,16 @@ ROWS = [
         description='adopt each trustworthy estimate that the monitor makes after a motion',
     ),
     Row(
+        name='report_advice',
+        default=True,
+        description='say in the verdict on a goal when a little more time would pay',
+    ),
+    Row(
+        name='report_baselines',
+        default=False,
+        description='state in the verdict on a goal what simpler methods would leave behind',
+    ),
+    Row(
         name='stream_effort',
         default=False,
         description='publish ~/effort_commands every sampling.period while the arm moves',
@@ -228,7 +245,12 @@ def build(values: Values) -> PlannerSettings:
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
+        insensitivity=insensitivity_of(values),
     )
+    if options.strategy is Strategy.INSENSITIVE:
+        if options.flat_model is not FlatModel.EXACT:
+            raise InvalidParameter('strategy insensitive needs flat_model: exact')
+        rehearse(arm, options.insensitivity)
     # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
     strategy_cost(
         options.strategy,
@@ -261,6 +283,8 @@ def build(values: Values) -> PlannerSettings:
         include_effort=values['command.include_effort'],
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
+        report_advice=values['report_advice'],
+        report_baselines=values['report_baselines'],
         stream_effort=values['stream_effort'],
     )
 

@@ -175,6 +175,11 @@ def test_points_too_close_in_time_are_refused(arm):
         replace(REQUEST, via=(REQUEST.via[1], REQUEST.via[0]))
 
 
+def test_insensitive_motions_have_no_via_points(arm):
+    with pytest.raises(InvalidRequest, match='insensitive'):
+        plan(REQUEST, arm, PlanningOptions(strategy=Strategy.INSENSITIVE))
+
+
 def test_fifty_points(arm):
     rng = np.random.default_rng(4)
     times = np.cumsum(rng.uniform(0.1, 0.4, 51))
