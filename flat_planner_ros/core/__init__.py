@@ -83,7 +83,7 @@ from flat_planner_ros.core.tradeoff import (
     advice,
     baselines,
     predicted_residual,
-    tradeoff,
+    tradeoff_points,
     TradeoffPoint,
 )
 from flat_planner_ros.core.via_times import with_via_times
@@ -178,7 +178,7 @@ __all__ = [
     'Strategy',
     'strategy_cost',
     'Track',
-    'tradeoff',
+    'tradeoff_points',
     'TradeoffPoint',
     'UncertaintyBox',
     'UncertifiedPlan',
