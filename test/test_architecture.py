@@ -27,7 +27,8 @@ MAY_IMPORT = {
     # the plant
     'interpolation': '',
     'effort_profile': 'interpolation errors',
-    'simulation': 'effort_profile arm errors',
+    'drives': 'effort_profile arm errors',
+    'simulation': 'drives effort_profile arm errors',
     'rollout': 'simulation effort_profile arm errors',
     'sensing': 'simulation errors',
     'simulation_settings': 'sensing simulation arm errors',
