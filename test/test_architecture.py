@@ -62,13 +62,14 @@ MAY_IMPORT = {
     'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'timeline': 'planning plan_samples',
-    'stopping': 'planning extremal solutions errors',
+    'timeline': 'limits planning plan_samples',
+    'stopping': 'limits planning extremal solutions errors',
     'extrema': 'planning plan_samples solutions',
     'limits': 'extrema planning errors',
     'duration': 'limits extrema planning errors',
-    'session': 'via_times request stopping timeline duration limits planning plan_samples '
-    'solutions goal motion_record cost flatness arm errors',
+    'timing': 'duration limits extrema planning goal errors',
+    'session': 'via_times request stopping timeline timing limits planning plan_samples solutions '
+    'goal motion_record cost flatness arm errors',
     'request': 'insensitivity solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
