@@ -72,7 +72,7 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
         a_0 ... a_6 in normalised time, a_0 = 0 and a_6 = 1, shape (7,) [-].
 
     """
-    zeros = int(np.flatnonzero(coefficients)[0])
+    zeros = next(k for k, a in enumerate(coefficients.tolist()) if a != 0.0)
     reduced = coefficients[zeros:]
     squares = _companion_roots(reduced)
     separate = _separate(reduced.tolist(), squares.tolist(), zeros)
@@ -98,7 +98,7 @@ def _companion_roots(ascending: NDArray[Number]) -> ComplexArray:
     if degree == 0:
         return np.zeros(0, dtype=complex)
     scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(first, start=1)) or 1.0
-    companion = np.eye(degree, k=-1, dtype=ascending.dtype)
+    companion = _shift(degree).astype(ascending.dtype)
     companion[0] = [-a / scale**n for n, a in enumerate(first, start=1)]
     roots: ComplexArray = np.linalg.eigvals(companion).astype(complex)
     roots *= scale
@@ -143,6 +143,12 @@ def _polished(ascending: list[float], z: complex) -> complex | None:
         if abs(step) <= CONVERGED * abs(z):
             return z
     return None
+
+
+@cache
+def _shift(degree: int) -> FloatArray:
+    """Return the companion matrix of D^degree."""
+    return np.eye(degree, k=-1)
 
 
 @cache
