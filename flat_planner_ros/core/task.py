@@ -121,7 +121,8 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
         largest = float((rates * unit.peaks).max())
     # (35) with every derivative in units of the half duration.
     cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
-    reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5)
+    # A law that is no minimum, which its certificate refuses, might have a negative cost.
+    reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5) if cost_value > 0 else 0.0
     return Task(
         arm=arm,
         duration=duration,
