@@ -70,6 +70,7 @@ setup(
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'flat_plan = flat_planner_ros.ros.flat_plan:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',
+            'tradeoff = flat_planner_ros.ros.tradeoff:main',
         ],
     },
     zip_safe=True,

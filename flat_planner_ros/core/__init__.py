@@ -79,11 +79,12 @@ from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
 from flat_planner_ros.core.timeline import Motion, Track
+from flat_planner_ros.core.timing import OnViolation
 from flat_planner_ros.core.tradeoff import (
     advice,
     baselines,
     predicted_residual,
-    tradeoff,
+    tradeoff_points,
     TradeoffPoint,
 )
 from flat_planner_ros.core.vibration import VibrationMonitor
@@ -140,6 +141,7 @@ __all__ = [
     'NoFeasibleDuration',
     'Nominal',
     'NotFlat',
+    'OnViolation',
     'OscillationFit',
     'Outcome',
     'OutOfReach',
@@ -177,7 +179,7 @@ __all__ = [
     'Strategy',
     'strategy_cost',
     'Track',
-    'tradeoff',
+    'tradeoff_points',
     'TradeoffPoint',
     'UncertaintyBox',
     'UncertifiedPlan',

@@ -179,7 +179,7 @@ def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:
     return tuple(found)
 
 
-def tradeoff(
+def tradeoff_points(
     request: MotionRequest,
     arm: PlanarArm,
     options: PlanningOptions,
