@@ -35,6 +35,7 @@ setup(
             'ros-jazzy-std-srvs==5.3.6',
             'ros-jazzy-trajectory-msgs==5.3.6',
         ],
+        'record': ['mcap>=1.6,<2', 'rosbags>=0.10,<0.12', 'zstandard>=0.22,<1'],
         'plot': ['matplotlib>=3.6,<4'],
         # What benchmarks/ compares with; each may be missing.
         'bench': [
@@ -48,13 +49,17 @@ setup(
         'test': [
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
+            'mcap>=1.6,<2',
+            'mcap-ros2-support>=0.5,<1',
             'mpmath>=1.2,<2',
             'mypy>=2.4,<2.5',
             'pytest>=7.4,<10',
             'pytest-timeout>=2.2,<3',
             'pytest-xdist>=3.5,<4',
             'pyyaml>=6,<7',
+            'rosbags>=0.10,<0.12',
             'ruff>=0.17,<0.18',
+            'zstandard>=0.22,<1',
         ],
     },
     entry_points={
@@ -62,6 +67,8 @@ setup(
             'planner_node = flat_planner_ros.ros.planner_node:main',
             'plant_node = flat_planner_ros.ros.plant_node:main',
             'monitor_node = flat_planner_ros.ros.monitor_node:main',
+            'record = flat_planner_ros.ros.record:main',
+            'analyse = flat_planner_ros.ros.analyse:main',
             'demo = flat_planner_ros.ros.demo:main',
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',

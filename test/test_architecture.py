@@ -53,7 +53,10 @@ MAY_IMPORT = {
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'session': 'planning goal motion_record cost flatness arm errors',
+    'extrema': 'planning plan_samples solutions',
+    'limits': 'extrema planning errors',
+    'duration': 'limits extrema planning errors',
+    'session': 'duration limits planning goal motion_record cost flatness arm errors',
     'request': 'solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
@@ -262,12 +265,14 @@ def test_test_dependencies_agree():
     }
     declared = {name.removeprefix('python3-') for name in manifest('test_depend')}
     only_pip = {'mpmath', 'mypy', 'pytest-timeout', 'pytest-xdist', 'ruff'}
+    only_pip |= {'mcap', 'mcap-ros2-support', 'rosbags', 'zstandard'}
     assert declared | only_pip == extra
 
 
 def test_what_is_imported_is_declared():
     declared = manifest('exec_depend') | {'numpy', 'scipy', 'matplotlib', 'flat_planner_ros'}
     declared |= {'rcl_interfaces', 'yaml'}  # what rclpy itself brings along
+    declared |= distributions(setup_arguments()['extras_require']['record'])
     used = set().union(*map(roots, [*PACKAGE.rglob('*.py'), *CHECKOUT.glob('launch/*.py')]))
     assert used - sys.stdlib_module_names <= declared
 

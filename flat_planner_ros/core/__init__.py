@@ -8,6 +8,7 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
@@ -18,6 +19,7 @@ from flat_planner_ros.core.errors import (
     NotFlat,
     UncertifiedPlan,
 )
+from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.goal import (
     check_point_count,
@@ -28,6 +30,7 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Residual, select
@@ -59,6 +62,8 @@ __all__ = [
     'bodies_of_links',
     'check_point_count',
     'EffortProfile',
+    'Extrema',
+    'extrema_of',
     'fit_oscillation',
     'flat_map',
     'FlatMap',
@@ -71,9 +76,11 @@ __all__ = [
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
+    'JointLimits',
     'JointSample',
     'Law',
     'Level',
+    'LimitUse',
     'LinkBody',
     'MAX_WEIGHT',
     'ModelTuner',
@@ -82,6 +89,7 @@ __all__ = [
     'MotionLaw',
     'MotionRequest',
     'NaturalMode',
+    'NoFeasibleDuration',
     'NotFlat',
     'OscillationFit',
     'PacedArm',
@@ -93,6 +101,7 @@ __all__ = [
     'PlanningOptions',
     'PlanSamples',
     'QuadraticCost',
+    'Quantity',
     'Reason',
     'ReportedEstimate',
     'RequestRejected',
@@ -102,6 +111,7 @@ __all__ = [
     'select',
     'Sensing',
     'SessionSettings',
+    'shortest_plan',
     'SimulatedArm',
     'SimulationSettings',
     'StartSource',

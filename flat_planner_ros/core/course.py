@@ -47,6 +47,10 @@ class Course(Protocol):
         """Return the law of each planned variable."""
 
     @property
+    def edges(self) -> tuple[float, ...]:
+        """Return the times from the start to the end between which the laws are smooth [s]."""
+
+    @property
     def cost_value(self) -> float:
         """Return the sum of their costs."""
 
@@ -95,6 +99,11 @@ class RestToRest:
         )
 
     @property
+    def edges(self) -> tuple[float, ...]:
+        """Return start and end of the motion [s]."""
+        return 0.0, self.task.duration
+
+    @property
     def cost_value(self) -> float:
         """Return the sum of the costs."""
         return sum(distance**2 for distance in self.distances) * self.task.cost_value
@@ -124,7 +133,7 @@ class RestToRest:
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
         travel = sum(abs(distance) for distance in self.distances)
-        return motion_quadrature(self.task.rates_of_modes, travel, [0.0, self.task.duration])
+        return motion_quadrature(self.task.rates_of_modes, travel, self.edges)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

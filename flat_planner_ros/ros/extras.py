@@ -1,0 +1,30 @@
+"""What the optional programs share: their command lines, and a word on missing libraries."""
+
+from collections.abc import Sequence
+import sys
+
+
+def split_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
+    """
+    Return a program's own arguments, and its name with the arguments for ROS.
+
+    Parameters
+    ----------
+    args
+        Whole command line; what follows ``--ros-args``, up to ``--`` if there is one, is for ROS.
+
+    """
+    program, rest = args[0], list(args[1:])
+    if '--ros-args' not in rest:
+        return rest, [program]
+    start = rest.index('--ros-args')
+    end = rest.index('--', start) if '--' in rest[start:] else len(rest)
+    return rest[:start] + rest[end + 1 :], [program, *rest[start:end]]
+
+
+def explain_missing(error: ImportError, extra: str) -> int:
+    """Say which extra a missing library comes with; return the exit code."""
+    library = (error.name or 'a library').partition('.')[0]
+    remedy = f'pip install "flat_planner_ros[{extra}]", or {library} itself'
+    print(f'{library} is not installed: {remedy}', file=sys.stderr)
+    return 1
