@@ -21,7 +21,7 @@ RELATIVE_TRANSFORMS = [('/tf', 'tf'), ('/tf_static', 'tf_static')]
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments and the viewers; what is not installed is left out."""
     arm = PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'arm_2dof.yaml'])
-    rviz = PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'rviz', f'{PACKAGE}.rviz'])
+    rviz = PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'rviz', 'flat_planner.rviz'])
     return LaunchDescription(
         [
             DeclareLaunchArgument('namespace', default_value='', description='of all nodes'),
@@ -51,9 +51,9 @@ def generate_launch_description() -> LaunchDescription:
 def _viewers(context: LaunchContext) -> list[LogInfo | Node]:
     """Return the nodes of the packages that are there."""
     namespace = LaunchConfiguration('namespace').perform(context)
-    # Substitution in the file, as for the nodes; and the file may not be there.
-    file = ParameterFile(LaunchConfiguration('params_file'), allow_substs=True).evaluate(context)
-    urdf = ParameterValue(read_urdf(file, namespace=namespace), value_type=str)
+    # With substitutions, as for the nodes; what they give is a file that lives as long as this.
+    file = ParameterFile(LaunchConfiguration('params_file'), allow_substs=True)
+    urdf = ParameterValue(read_urdf(file.evaluate(context), namespace=namespace), value_type=str)
     wanted = {
         'robot_state_publisher': [
             _publisher('robot_state_publisher', {'robot_description': urdf}),
