@@ -1,19 +1,24 @@
 """Parameters of the planner node."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isqrt
+from math import isqrt
 
 from flat_planner_ros.core import (
     flat_map,
     FlatModel,
+    JointLimits,
     MAX_WEIGHT,
+    OnViolation,
     PlanningOptions,
     QuadraticCost,
+    rehearse,
     SessionSettings,
     StartSource,
     Strategy,
     strategy_cost,
 )
+from flat_planner_ros.ros.insensitivity_parameters import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
 import numpy as np
 from rclpy.parameter import Parameter
@@ -28,22 +33,31 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
-    include_passive_joint, include_effort, absolute_stamp
+    include_passive_joint, include_effort
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
+    report_advice, report_baselines
+        What the verdict on a goal says besides.
+    stream_effort
+        Whether `~/effort_commands` is published.
 
     """
 
     session: SessionSettings
     include_passive_joint: bool
     include_effort: bool
-    absolute_stamp: bool
     reference_rate: float
     auto_tune: bool
+    report_advice: bool
+    report_baselines: bool
+    stream_effort: bool
 
+
+LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
+"""What may be limited."""
 
 ROWS = [
     *model_rows(read_only=False),
@@ -72,6 +86,7 @@ ROWS = [
         default=Parameter.Type.DOUBLE_ARRAY,
         description='36 numbers, row by row: the cost of the strategy custom',
     ),
+    *INSENSITIVITY_ROWS,
     Row(
         name='flat_model',
         default=FlatModel.EXACT.value,
@@ -86,7 +101,7 @@ ROWS = [
     Row(
         name='duration.default',
         default=0.0,
-        description='duration of goals without times [s]; 0 = automatic, not yet available',
+        description='duration of goals without times [s]; 0 = the shortest within limits',
         lower=0.0,
     ),
     Row(name='duration.min', default=0.05, description='shortest duration [s]', lower=0.0),
@@ -95,25 +110,31 @@ ROWS = [
         name='limits.position_min',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='lower position limits per joint [rad]; not yet available',
+        description='lower position limits per joint [rad]; .inf = none',
     ),
     Row(
         name='limits.position_max',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='upper position limits per joint [rad]; not yet available',
+        description='upper position limits per joint [rad]; .inf = none',
     ),
     Row(
         name='limits.velocity',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='velocity limits per joint [rad/s]; not yet available',
+        description='velocity limits per joint [rad/s]; .inf = none',
     ),
     Row(
         name='limits.effort',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='effort limits per joint [N m]; not yet available',
+        description='effort limits per joint [N m]; .inf = none',
+    ),
+    Row(
+        name='limits.on_violation',
+        default=OnViolation.REJECT.value,
+        description='what becomes of a motion that is too fast for the limits',
+        choices=tuple(choice.value for choice in OnViolation),
     ),
     Row(
         name='sampling.period',
@@ -158,6 +179,13 @@ ROWS = [
         lower=0.0,
     ),
     Row(
+        name='replan.lookahead',
+        default=0.1,
+        description='from accepting a goal while the arm moves to the start of its motion [s]',
+        lower=0.01,
+        upper=10.0,
+    ),
+    Row(
         name='execute',
         default=True,
         description='publish commands; false = plan and report only',
@@ -192,9 +220,19 @@ ROWS = [
         description='adopt each trustworthy estimate that the monitor makes after a motion',
     ),
     Row(
+        name='report_advice',
+        default=True,
+        description='say in the verdict on a goal when a little more time would pay',
+    ),
+    Row(
+        name='report_baselines',
+        default=False,
+        description='state in the verdict on a goal what simpler methods would leave behind',
+    ),
+    Row(
         name='stream_effort',
         default=False,
-        description='stream ~/effort_commands; not yet available',
+        description='publish ~/effort_commands every sampling.period while the arm moves',
     ),
 ]
 """All parameters of the planner node."""
@@ -210,7 +248,6 @@ def build(values: Values) -> PlannerSettings:
         They contradict each other, or ask for what this version does not have.
 
     """
-    _refuse_unavailable(values)
     joints, arm = arm_of(values)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
@@ -219,7 +256,12 @@ def build(values: Values) -> PlannerSettings:
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
+        insensitivity=insensitivity_of(values),
     )
+    if options.strategy is Strategy.INSENSITIVE:
+        if options.flat_model is not FlatModel.EXACT:
+            raise InvalidParameter('strategy insensitive needs flat_model: exact')
+        rehearse(arm, options.insensitivity)
     # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
     strategy_cost(
         options.strategy,
@@ -236,22 +278,40 @@ def build(values: Values) -> PlannerSettings:
         default_duration=values['duration.default'],
         min_duration=values['duration.min'],
         max_duration=values['duration.max'],
+        limits=_limits(values, joints),
+        on_violation=OnViolation(values['limits.on_violation']),
         start_source=StartSource(values['start.source']),
         start_position=tuple(values.get('start.position', ())),
         position_tolerance=values['start.position_tolerance'],
         velocity_tolerance=values['start.velocity_tolerance'],
         measurement_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
+        lookahead=values['replan.lookahead'],
+        is_stamped=values['command.stamp'] == 'absolute',
         execute=values['execute'],
     )
     return PlannerSettings(
         session=session,
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
-        absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
+        report_advice=values['report_advice'],
+        report_baselines=values['report_baselines'],
+        stream_effort=values['stream_effort'],
     )
+
+
+def _limits(values: Values, joints: Sequence[str]) -> JointLimits:
+    """Return the limits of all joints."""
+    given = {name: values[f'limits.{name}'] for name in LIMITS if f'limits.{name}' in values}
+    for name, numbers in given.items():
+        if len(numbers) != len(joints):
+            raise InvalidParameter(
+                f'limits.{name} needs one number for each of {", ".join(joints)}, .inf where '
+                f'there is no limit; got {len(numbers)}'
+            )
+    return JointLimits.of(len(joints), **given)
 
 
 def _custom_cost(values: Values) -> np.ndarray | None:
@@ -263,14 +323,3 @@ def _custom_cost(values: Values) -> np.ndarray | None:
     matrix = np.reshape(numbers, (side, side) if side**2 == len(numbers) else -1)
     # Refused now if it is inadmissible, even while another strategy is in use.
     return QuadraticCost(matrix=matrix).matrix
-
-
-def _refuse_unavailable(values: Values) -> None:
-    """Refuse what a later version will do, rather than ignore it."""
-    if values['stream_effort']:
-        raise InvalidParameter('stream_effort is not available in this version, set it to false')
-    for name, value in values.items():
-        if name.startswith('limits.') and not all(abs(number) == inf for number in value):
-            raise InvalidParameter(
-                f'{name} is not available in this version, leave it out or set it to .inf'
-            )
