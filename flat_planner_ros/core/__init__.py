@@ -79,6 +79,7 @@ from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
 from flat_planner_ros.core.timeline import Motion, Track
+from flat_planner_ros.core.timing import OnViolation
 from flat_planner_ros.core.tradeoff import (
     advice,
     baselines,
@@ -86,6 +87,7 @@ from flat_planner_ros.core.tradeoff import (
     tradeoff_points,
     TradeoffPoint,
 )
+from flat_planner_ros.core.via_times import with_via_times
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -140,6 +142,7 @@ __all__ = [
     'NoFeasibleDuration',
     'Nominal',
     'NotFlat',
+    'OnViolation',
     'OscillationFit',
     'Outcome',
     'OutOfReach',
@@ -184,4 +187,5 @@ __all__ = [
     'ViaPoint',
     'VibrationMonitor',
     'VibrationReport',
+    'with_via_times',
 ]

@@ -8,13 +8,17 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
-from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target, RestTarget
+from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
+from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, ViaPoint
+from flat_planner_ros.core.request import planned_at_rest
 from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.stopping import stop_plan
 from flat_planner_ros.core.timeline import Motion, Timeline, Track
+from flat_planner_ros.core.timing import OnViolation, TimedPlan, Timing
+from flat_planner_ros.core.via_times import with_via_times
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,8 +26,15 @@ FloatArray = NDArray[np.float64]
 
 Clock = Callable[[], float]
 
+LONGEST_FOUND = 3600.0
+"""Longest duration that is looked for where the settings name none [s]."""
+
 HANDOVER = 0.25
 """Part of the lookahead that is left for a command to reach its executor [-]."""
+
+
+NOMINAL_DURATION = 1.0
+"""Duration of a request before its own is found [s]."""
 
 
 class StartSource(Enum):
@@ -56,9 +67,13 @@ class SessionSettings:
     period
         Spacing of a motion's samples [s].
     default_duration
-        Duration of goals without times [s]; 0 where there is none.
+        Duration of goals without times [s]; 0 for the shortest within the limits.
     min_duration, max_duration
         Range of durations that are accepted [s].
+    limits
+        What the joints may do; None where nothing is limited.
+    on_violation
+        What becomes of durations that are too short for them.
     start_source
         Where motions start.
     start_position
@@ -86,6 +101,8 @@ class SessionSettings:
     default_duration: float = 0.0
     min_duration: float = 0.0
     max_duration: float = inf
+    limits: JointLimits | None = None
+    on_violation: OnViolation = OnViolation.REJECT
     start_source: StartSource = StartSource.AUTO
     start_position: tuple[float, ...] = ()
     position_tolerance: float = 0.01
@@ -108,6 +125,10 @@ class SessionSettings:
             raise InvalidRequest(
                 f'duration.max = {self.max_duration:g} s is below duration.min = '
                 f'{self.min_duration:g} s'
+            )
+        if self.limits is not None and len(self.limits.velocity) != self.arm.n:
+            raise InvalidRequest(
+                f'limits of {len(self.limits.velocity)} joints for an arm of {self.arm.n} joints'
             )
         if self.start_source is StartSource.PARAMETER:
             if len(self.start_position) != self.arm.n:
@@ -240,19 +261,15 @@ class PlannerSession:
         target = rest_target(goal, settings.joints)
         duration = self._checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
-        request = MotionRequest(
-            start=origin.pose,
-            final=np.array(target.positions),
-            duration=duration,
-            start_jets=origin.jets,
-        )
-        planned = self._planned(request, settings.options, origin)
+        timed = self._planned(origin, target, duration)
         motion = Motion(
             plan_id=self._count + 1,
-            plan=planned,
-            samples=planned.sample(settings.period),
+            plan=timed.plan,
+            samples=timed.plan.sample(settings.period),
             start=origin.time,
             planned_at=now,
+            duration_min=timed.duration_min,
+            exceeded=timed.exceeded,
         )
         motion = self._launched(motion, origin, goal.stamp, clock)
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
@@ -282,7 +299,15 @@ class PlannerSession:
             raise RequestRejected(
                 Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
             )
-        planned = stop_plan(running.plan, origin.pose, origin.jets, running.end - origin.time)
+        limits = self._timing(origin.pose).limits
+        remaining = running.end - origin.time
+        planned = stop_plan(running.plan, origin.pose, origin.jets, remaining, limits)
+        if planned is None:
+            raise RequestRejected(
+                Reason.BUSY,
+                f'no stop within the limits ends sooner than the motion itself, in '
+                f'{running.end - now:.3f} s; it goes on',
+            )
         motion = Motion(
             plan_id=running.plan_id,
             plan=planned,
@@ -320,16 +345,19 @@ class PlannerSession:
         motion = self._timeline.at(now) or self._motion
         return None if motion is None else motion.reference(now)
 
-    def _checked_duration(self, prescribed: float | None) -> float:
-        """Return the duration of a goal, within its range."""
+    def _checked_duration(self, prescribed: float | None) -> float | None:
+        """Return the duration of a goal, within its range; None for an automatic one."""
         settings = self.settings
         duration = settings.default_duration if prescribed is None else prescribed
         if duration == 0.0:
-            raise RequestRejected(
-                Reason.DURATION_OUT_OF_RANGE,
-                'the goal prescribes no duration, and automatic duration is not available in this '
-                'version: set time_from_start in the goal or the parameter duration.default',
-            )
+            if settings.limits is None or not settings.limits.bound_duration:
+                raise RequestRejected(
+                    Reason.DURATION_OUT_OF_RANGE,
+                    'the goal prescribes no duration, and no limit of a velocity or an effort '
+                    'makes one the shortest: set time_from_start in the goal, or one of the '
+                    'parameters duration.default, limits.velocity and limits.effort',
+                )
+            return None
         if not settings.min_duration <= duration <= settings.max_duration:
             below = duration < settings.min_duration
             limit = settings.min_duration if below else settings.max_duration
@@ -342,15 +370,34 @@ class PlannerSession:
             )
         return duration
 
-    def _planned(self, request: MotionRequest, options: PlanningOptions, origin: Origin) -> Plan:
-        """Return a plan that is good to the promised accuracy."""
-        arm = self.settings.arm
+    def _planned(self, origin: Origin, target: RestTarget, duration: float | None) -> TimedPlan:
+        """Return a plan within the limits that is good to the promised accuracy."""
+        arm, options = self.settings.arm, self.settings.options
         if origin.jets is not None and origin.before is not None:
             # What the arm is planned to do then is said in terms of the model it was planned with.
             arm = origin.before.plan.task.arm
             options = replace(options, flat_model=origin.before.plan.options.flat_model)
+
+        timing = self._timing(origin.pose)
+        timing.check_pose('the start', origin.pose)
+        for index, point in enumerate(target.via):
+            timing.check_pose(f'via point {index}', np.array(point.positions))
+        timing.check_pose('the final', np.array(target.positions))
+
+        def timed(request: MotionRequest) -> TimedPlan:
+            return timing.timed(lambda time: plan(request.stretched(time), arm, options), duration)
+
+        request = _request(target, origin, duration or NOMINAL_DURATION)
         try:
-            return plan(request, arm, options)
+            if not target.chooses_times:
+                return timed(request)
+            found = timed(with_via_times(request, arm, options))
+            if duration is not None:
+                return found
+            # The best shares of the time depend on the time, if little.
+            return timed(with_via_times(found.plan.request, arm, options))
+        except InvalidRequest as error:
+            raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
         except OutOfReach as error:
             raise RequestRejected(
                 Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
@@ -363,6 +410,19 @@ class PlannerSession:
                 value=error.residual,
                 limit=error.tolerance,
             ) from error
+
+    def _timing(self, start: FloatArray) -> Timing:
+        """Return the rules for the duration of a motion from a pose."""
+        settings = self.settings
+        limits = settings.limits or JointLimits.of(settings.arm.n)
+        return Timing(
+            joints=settings.joints,
+            limits=limits.reaching(start, settings.position_tolerance),
+            on_violation=settings.on_violation,
+            # A motion shorter than the spacing of its samples would be none.
+            shortest=max(settings.min_duration, settings.period),
+            longest=min(settings.max_duration, LONGEST_FOUND),
+        )
 
     def _launched(
         self, motion: Motion, origin: Origin, stamp: float | None, clock: Clock | None
@@ -510,6 +570,25 @@ def _check_time(now: float) -> None:
             Reason.START_STATE_UNKNOWN,
             'there is no time yet: use_sim_time is set, but no /clock has been received',
         )
+
+
+def _request(target: RestTarget, origin: Origin, duration: float) -> MotionRequest:
+    """Return what is asked of a plan; via times that are to be chosen are even for now."""
+    count = len(target.via) + 1
+    via = tuple(
+        ViaPoint(
+            time=duration * index / count if point.time is None else point.time,
+            values=np.array(planned_at_rest(np.array(point.positions))),
+        )
+        for index, point in enumerate(target.via, start=1)
+    )
+    return MotionRequest(
+        start=origin.pose,
+        final=np.array(target.positions),
+        duration=duration,
+        via=via,
+        start_jets=origin.jets,
+    )
 
 
 def _too_late(stamp: float, now: float) -> RequestRejected:

@@ -205,7 +205,7 @@ def refused_goals() -> dict[str, tuple[JointTrajectory, str, str]]:
     missing.joint_names = ['joint2']
     loaded = goal(positions=[1.0, 0.2])
     loaded.joint_names = ['joint1', 'joint2']
-    via = goal()
+    via = goal(velocities=[0.5])
     via.points = [*via.points, *goal(duration=2.0).points]
     standing = goal()
     standing.points = [*standing.points, *standing.points]
@@ -233,7 +233,7 @@ def refused_goals() -> dict[str, tuple[JointTrajectory, str, str]]:
         'too short': (goal(duration=1e-9), '-113', 'DURATION_OUT_OF_RANGE'),
         'too long': (goal(duration=1e9), '-113', 'DURATION_OUT_OF_RANGE'),
         'past': (goal(stamp=1.0), '-3', 'OLD_HEADER_TIMESTAMP'),
-        'via point': (via, '-1', 'INVALID_GOAL'),
+        'moving via point': (via, '-1', 'INVALID_GOAL'),
         'enormous': (many, '-1', 'INVALID_GOAL'),
     }
 
@@ -359,7 +359,10 @@ def test_replanning_needs_a_goal_and_stopping_a_motion(planner, graph):
         ('weights.Q', [1.0], '36'),
         ('model.stiffness', -1.0, 'stiffness'),
         ('model.inertia_star', [3.3e-5, 6.4e-4], 'kg m^2'),
-        ('limits.effort', [0.01, inf], 'not available'),
+        ('limits.effort', [0.01], 'one number for each of joint1, joint2'),
+        ('limits.velocity', [0.0, inf], 'above 0'),
+        ('limits.position_max', [nan, inf], 'limits.position_max'),
+        ('limits.on_violation', 'ignore', 'scale'),
         ('duration.max', 1e-4, 'duration.min'),
         ('start.source', 'parameter', 'start.position'),
         ('start_delay', nan, 'start_delay'),
