@@ -43,6 +43,12 @@ setup(
         ],
         # Second opinions on the URDF; tests that want one of them are skipped without it.
         'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],
+        'docs': [
+            'furo>=2024.1',
+            'myst-parser>=3,<6',
+            'numpydoc>=1.6,<2',
+            'sphinx>=7.2,<9',
+        ],
         'test': [
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
