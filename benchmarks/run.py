@@ -12,12 +12,19 @@ import platform
 import sys
 
 BENCHMARKS = (
-    *('planning', 'scaling', 'duration'),
-    *('node_path', 'plant', 'monitor', 'start_up', 'stream'),
+    'planning',
+    'scaling',
+    'node_path',
+    'plant',
+    'monitor',
+    'start_up',
+    'stream',
+    'via_points',
+    'duration',
 )
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream', 'duration')
+WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'
