@@ -11,10 +11,20 @@ from pathlib import Path
 import platform
 import sys
 
-BENCHMARKS = ('planning', 'scaling', 'node_path', 'plant', 'monitor', 'start_up', 'stream')
+BENCHMARKS = (
+    'planning',
+    'scaling',
+    'node_path',
+    'plant',
+    'monitor',
+    'start_up',
+    'stream',
+    'via_points',
+    'duration',
+)
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream')
+WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'
