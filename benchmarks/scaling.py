@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 from flat_planner_ros.core import MotionRequest, plan, PlanarArm
+from flat_planner_ros.core.unit_motion import MAX_KEPT_INTERVALS
 from measurement import duration_text, Section, Timing, timing
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ import problem
 
 COUNTS = (100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
 """Numbers of samples."""
+
+LONGEST_KEPT = MAX_KEPT_INTERVALS
+"""Samples from which a motion is no longer kept."""
 
 KEPT_MEMORY = {
     'MALLOC_MMAP_THRESHOLD_': '2000000000',
@@ -61,7 +65,11 @@ def _samples_section() -> Section:
     times, counts = sample_times(), np.array(COUNTS, dtype=float)
     medians = np.array([each.median for each in times])
     kept = _with_kept_memory()
-    fixed, slope = _line(counts, np.array([each.median for each in kept]))
+    own = np.array([each.median for each in kept])
+    # To this length the motion over 1 rad is kept, beyond it is computed each time: two lines.
+    is_short = counts <= LONGEST_KEPT
+    lines = [_line(counts[part], own[part]) for part in (is_short, ~is_short)]
+    fixed, slope = lines[0]
     if find_spec('matplotlib') is not None:
         _draw(counts, medians, fixed, slope)
     return Section(
@@ -74,16 +82,23 @@ def _samples_section() -> Section:
                 f'{1e9 * each.median / number:.3g} ns',
                 duration_text(other.best),
                 duration_text(other.median),
-                f'{other.median / (fixed + slope * number):.2f}',
+                f'{other.median / (line[0] + line[1] * number):.2f}',
             )
-            for number, each, other in zip(COUNTS, times, kept, strict=True)
+            for number, each, other, line in zip(
+                COUNTS, times, kept, [lines[not short] for short in is_short], strict=True
+            )
         ],
         [
             'positions, velocities, accelerations, torques, y to y^(5)',
-            f'line: {duration_text(fixed)} + {1e9 * slope:.3g} ns per sample, memory kept',
+            *(
+                f'line {where} {LONGEST_KEPT} samples: {1e6 * each[0]:.3g} µs + '
+                f'{1e9 * each[1]:.3g} ns per sample, memory kept'
+                for where, each in zip(('to', 'beyond'), lines, strict=True)
+            ),
             'memory kept: freed memory is not given back to the system, which else has to '
             'provide every page of a long table anew',
-            'to 10 000 intervals the motion over 1 rad is kept, beyond it is computed each time',
+            f'to {LONGEST_KEPT} samples the motion over 1 rad is kept, beyond it is computed '
+            'each time',
         ],
     )
 
@@ -129,7 +144,7 @@ def _joints_section() -> Section:
         [(*row, share) for row, share in zip(rows, shares, strict=True)],
         [
             f'line through three to seven: {duration_text(fixed)} + {duration_text(slope)} per '
-            'joint; the efforts before the last two joints take the recursive inverse dynamics'
+            "joint; the efforts before the last two joints take the arm's inverse dynamics"
         ],
     )
 
