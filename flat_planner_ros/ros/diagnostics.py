@@ -94,10 +94,12 @@ def accepted_status(
 
     """
     plan = motion.plan
-    peak = plan.peak_effort[-2]
+    peaks = plan.peak_effort
+    strongest = int(peaks.argmax())
     message = (
         f'plan {motion.plan_id}: {plan.options.strategy.value}, {plan.request.duration:g} s, '
-        f'peak effort {peak:.4g} N m, starts at {motion.start:.3f} s'
+        f'peak effort {peaks[strongest]:.4g} N m of {joints[strongest]}, '
+        f'starts at {motion.start:.3f} s'
     )
     values: dict[str, float | int | str | None] = {
         **_of_motion(motion, 'ACCEPTED'),
@@ -193,6 +195,29 @@ def reported_estimate(msg: DiagnosticArray) -> ReportedEstimate | None:
         except (KeyError, ValueError) as error:
             raise InvalidRequest(f'estimate with missing or unreadable {error}') from error
     return None
+
+
+def adopted_values(msg: DiagnosticArray) -> dict[str, float]:
+    """
+    Return stiffness and damping that a planner has adopted, nothing if the message is of goals.
+
+    Raises
+    ------
+    InvalidRequest
+        The values cannot be read.
+
+    """
+    adopted: dict[str, float] = {}
+    for status in msg.status:
+        if status.name == MODEL_NAME:
+            values = {pair.key: pair.value for pair in status.values}
+            try:
+                adopted = {name: float(values[name]) for name in ('stiffness', 'damping')}
+            except (KeyError, ValueError) as error:
+                raise InvalidRequest(
+                    f'adopted model with missing or unreadable {error}'
+                ) from error
+    return adopted
 
 
 def report_status(report: VibrationReport) -> DiagnosticStatus:
