@@ -12,6 +12,7 @@ setup(
     maintainer_email='flat-planner-ros@users.noreply.github.com',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
+    package_data={package_name: ['live/page/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -33,6 +34,7 @@ setup(
             'ros-jazzy-trajectory-msgs==5.3.6',
         ],
         'record': ['mcap>=1.6,<2', 'rosbags>=0.10,<0.12', 'zstandard>=0.22,<1'],
+        'live': ['aiohttp>=3.9,<4'],
         'plot': ['matplotlib>=3.6,<4'],
         # What benchmarks/ compares with; each may be missing.
         'bench': [
@@ -43,7 +45,10 @@ setup(
         ],
         # Second opinions on the URDF; tests that want one of them are skipped without it.
         'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],
+        # The live view in a real browser, Chromium; skipped without.
+        'browser': ['playwright>=1.49,<2'],
         'test': [
+            'aiohttp>=3.9,<4',
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
             'mcap>=1.6,<2',
@@ -66,6 +71,7 @@ setup(
             'monitor_node = flat_planner_ros.ros.monitor_node:main',
             'record = flat_planner_ros.ros.record:main',
             'analyse = flat_planner_ros.ros.analyse:main',
+            'live_view = flat_planner_ros.ros.live_view:main',
             'demo = flat_planner_ros.ros.demo:main',
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'paper_table = flat_planner_ros.ros.paper_table:main',
