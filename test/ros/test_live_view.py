@@ -379,19 +379,23 @@ def test_fast_joint_states_are_thinned_out(graph):
 def test_time_that_begins_again_begins_a_new_page(graph):
     view = View(graph)
 
+    states = graph.probe.create_publisher(JointState, '/joint_states', 10)
+    msg = JointState(name=['joint1', 'joint2'], position=[1.0, 0.0])
+    msg.header.stamp.sec = 1000
+
+    async def publish() -> None:
+        while True:
+            states.publish(msg)
+            await asyncio.sleep(0.02)
+
     async def act(browser: Browser) -> None:
-        states = graph.probe.create_publisher(JointState, '/joint_states', 10)
-        msg = JointState(name=['joint1', 'joint2'], position=[1.0, 0.0])
-
-        async def publish_until(condition: Callable[[], object]) -> None:
-            while not condition():
-                states.publish(msg)
-                await asyncio.wait({asyncio.ensure_future(browser.hear())}, timeout=TIMEOUT)
-
-        msg.header.stamp.sec = 1000
-        await publish_until(lambda: browser.streams.get('measured'))
+        publishing = asyncio.create_task(publish())
+        await browser.expect(lambda: browser.streams.get('measured'), 'joint states')
         msg.header.stamp.sec, msg.position[0] = 3, 2.0
-        await publish_until(lambda: browser.streams.get('measured', [[0, 0]])[-1][1] == 2.0)
+        await browser.expect(
+            lambda: browser.streams.get('measured', [[0, 0]])[-1][1] == 2.0, 'later ones'
+        )
+        publishing.cancel()
         assert {row[1] for row in browser.streams['measured']} == {2.0}
         assert browser.streams['measured'][0][0] == 0.0
 
