@@ -11,10 +11,10 @@ from pathlib import Path
 import platform
 import sys
 
-BENCHMARKS = ('planning', 'scaling', 'node_path', 'plant', 'monitor', 'start_up')
+BENCHMARKS = ('planning', 'scaling', 'node_path', 'plant', 'monitor', 'start_up', 'stream')
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling')
+WITHOUT_ROS = ('planning', 'scaling', 'stream')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'

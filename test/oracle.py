@@ -25,19 +25,23 @@ MAX_SWEEPS = 400
 Roots = list[tuple[mp.mpc, int]]
 
 
-def characteristic(*, both, last, stiffness, damping, r, p) -> list[mp.mpf]:
-    """Return a_0 ... a_6 of y6^2 + r^8 tau^2 + p^8 y2^2 with the paper's effort tau."""
+def characteristic(
+    *, both, last, stiffness, damping, r, p, is_damping_exact=False
+) -> list[mp.mpf]:
+    """Return a_0 ... a_6 of y6^2 + r^8 tau^2 + p^8 y2^2, tau the exact or the paper's effort."""
     with mp.workdps(DIGITS):
         both, last, k, c, r, p = map(mp.mpf, (both, last, stiffness, damping, r, p))
         compliant = last * (both - last) / k
         weight = r**8
+        # Damping adds the third derivative to the exact effort, the fifth to the paper's.
+        third, fifth = (both * c / k, 0) if is_damping_exact else (0, compliant * c / k)
         return [
             mp.mpf(0),
             mp.mpf(0),
             weight * both**2 + p**8,
-            2 * weight * both * compliant,
+            weight * (2 * both * compliant - third**2),
             weight * compliant**2,
-            -weight * (compliant * c / k) ** 2,
+            -weight * fifth**2,
             mp.mpf(1),
         ]
 

@@ -22,6 +22,7 @@ MAY_IMPORT = {
     'errors': '',
     'links': 'errors',
     'arm': 'links errors',
+    'counterbalance': 'links errors',
     'link_bodies': 'links errors',
     # the plant
     'interpolation': '',
@@ -51,17 +52,35 @@ MAY_IMPORT = {
     'extremal': 'solutions motion_law modes roots errors',
     'quadrature': 'motion_law modes errors',
     'unit_motion': 'quadrature extremal solutions motion_law modes errors',
+    'robustness': 'arm errors',
+    'insensitivity': 'robustness arm errors',
+    'shaping': 'arm errors',
+    'tradeoff': 'planning plan_samples shaping insensitivity robustness cost arm errors',
+    'momentum': 'flatness arm errors',
+    'insensitive': 'insensitivity momentum robustness flatness arm errors',
+    'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
+    'timeline': 'planning plan_samples',
+    'stopping': 'planning extremal solutions errors',
     'extrema': 'planning plan_samples solutions',
     'limits': 'extrema planning errors',
     'duration': 'limits extrema planning errors',
-    'session': 'duration limits planning goal motion_record cost flatness arm errors',
-    'request': 'solutions cost flatness errors',
+    'session': 'stopping timeline duration limits planning plan_samples solutions goal '
+    'motion_record cost flatness arm errors',
+    'request': 'insensitivity solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
     'moving_start': 'task unit_motion extremal solutions motion_law',
-    'planning': 'moving_start course task request plan_samples cost flatness arm errors',
+    # motions through via points
+    'segment_basis': 'solutions roots modes',
+    'coupling': 'segment_basis solutions errors',
+    'piecewise_law': 'motion_law',
+    'via_points': 'coupling segment_basis piecewise_law moving_start unit_motion extremal '
+    'solutions motion_law cost errors',
+    'via_times': 'via_points cost errors',
+    'planning': 'via_points shaped_course moving_start solutions course task request plan_samples '
+    'cost flatness arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

@@ -8,6 +8,12 @@ from flat_planner_ros.core.adoption import (
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
+from flat_planner_ros.core.counterbalance import (
+    Counterbalances,
+    counterbalances,
+    displaced_com,
+    remedy,
+)
 from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import (
@@ -17,6 +23,7 @@ from flat_planner_ros.core.errors import (
     InvalidModel,
     InvalidRequest,
     NotFlat,
+    OutOfReach,
     UncertifiedPlan,
 )
 from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
@@ -30,6 +37,14 @@ from flat_planner_ros.core.goal import (
     rest_target,
 )
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
+from flat_planner_ros.core.insensitive import least_effort, rehearse
+from flat_planner_ros.core.insensitivity import (
+    Criterion,
+    DEFAULT_WEIGHT,
+    Insensitivity,
+    MAX_INSENSITIVITY,
+    Nominal,
+)
 from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
 from flat_planner_ros.core.motion_law import MotionLaw
@@ -45,11 +60,32 @@ from flat_planner_ros.core.planning import (
     PlanSamples,
     ViaPoint,
 )
+from flat_planner_ros.core.robustness import (
+    MAX_HALF_WIDTH,
+    predict_residual,
+    PredictedResidual,
+    UncertaintyBox,
+)
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.session import Motion, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import (
+    Ended,
+    Outcome,
+    PlannerSession,
+    SessionSettings,
+    StartSource,
+)
+from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
+from flat_planner_ros.core.timeline import Motion, Track
+from flat_planner_ros.core.tradeoff import (
+    advice,
+    baselines,
+    predicted_residual,
+    tradeoff_points,
+    TradeoffPoint,
+)
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -57,11 +93,19 @@ __all__ = [
     'ActuatedJoints',
     'Adoption',
     'AdoptionRefused',
+    'advice',
     'ArmState',
+    'baselines',
     'bodies_of_constants',
     'bodies_of_links',
     'check_point_count',
+    'counterbalances',
+    'Counterbalances',
+    'Criterion',
+    'DEFAULT_WEIGHT',
+    'displaced_com',
     'EffortProfile',
+    'Ended',
     'Extrema',
     'extrema_of',
     'fit_oscillation',
@@ -72,6 +116,7 @@ __all__ = [
     'Goal',
     'GoalPoint',
     'identify',
+    'Insensitivity',
     'InvalidCommand',
     'InvalidCost',
     'InvalidModel',
@@ -79,9 +124,12 @@ __all__ = [
     'JointLimits',
     'JointSample',
     'Law',
+    'least_effort',
     'Level',
     'LimitUse',
     'LinkBody',
+    'MAX_HALF_WIDTH',
+    'MAX_INSENSITIVITY',
     'MAX_WEIGHT',
     'ModelTuner',
     'MonitorSettings',
@@ -90,8 +138,11 @@ __all__ = [
     'MotionRequest',
     'NaturalMode',
     'NoFeasibleDuration',
+    'Nominal',
     'NotFlat',
     'OscillationFit',
+    'Outcome',
+    'OutOfReach',
     'PacedArm',
     'Plan',
     'plan',
@@ -100,9 +151,14 @@ __all__ = [
     'PlannerSession',
     'PlanningOptions',
     'PlanSamples',
+    'predict_residual',
+    'predicted_residual',
+    'PredictedResidual',
     'QuadraticCost',
     'Quantity',
     'Reason',
+    'rehearse',
+    'remedy',
     'ReportedEstimate',
     'RequestRejected',
     'Residual',
@@ -111,6 +167,8 @@ __all__ = [
     'select',
     'Sensing',
     'SessionSettings',
+    'shaped_quintic',
+    'Shaper',
     'shortest_plan',
     'SimulatedArm',
     'SimulationSettings',
@@ -118,8 +176,12 @@ __all__ = [
     'StiffnessEstimate',
     'Strategy',
     'strategy_cost',
+    'Track',
+    'tradeoff_points',
+    'TradeoffPoint',
+    'UncertaintyBox',
     'UncertifiedPlan',
+    'ViaPoint',
     'VibrationMonitor',
     'VibrationReport',
-    'ViaPoint',
 ]

@@ -412,13 +412,13 @@ class PlanarArm:
         if self._has_friction:
             net[..., :-1] -= self.friction(dq)
         if self._inverse_mass is not None:
-            if self._has_weight:
+            if self.has_weight:
                 net -= self.gravity_effort(q)
             return net @ self._inverse_mass
         theta = np.cumsum(q, axis=-1)
         apart = _apart(theta)
         load = net @ self._difference - self._centrifugal(apart, dq)
-        if self._has_weight:
+        if self.has_weight:
             load -= self._weight(theta)
         solution = np.linalg.solve(self._link_inertia(apart), load[..., None])
         return np.asarray(solution[..., 0], dtype=float) @ self._difference.T
@@ -487,7 +487,8 @@ class PlanarArm:
         return bool(self.viscous_friction.any() or self.coulomb_friction.any())
 
     @cached_property
-    def _has_weight(self) -> bool:
+    def has_weight(self) -> bool:
+        """Whether gravity moves the arm, so that it takes efforts to keep it at rest."""
         return self.gravity != 0.0 and bool(self.static_moment.any())
 
 

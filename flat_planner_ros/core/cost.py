@@ -33,13 +33,14 @@ SYMMETRY_TOLERANCE = 1e-12
 
 
 class Strategy(Enum):
-    """Named costs of the paper, and one's own."""
+    """Named costs of the paper, one's own, and the trade of `insensitive`."""
 
     POLYNOMIAL = 'polynomial'
     MIN_CONTROL_EFFORT = 'min_control_effort'
     MIN_POTENTIAL_ENERGY = 'min_potential_energy'
     MIXED = 'mixed'
     CUSTOM = 'custom'
+    INSENSITIVE = 'insensitive'
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

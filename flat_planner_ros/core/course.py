@@ -153,6 +153,8 @@ class FreeCourse:
         Planned variables at rest at the end, shape (n - 1,) [rad].
     edges
         Times from the start to the end between which the laws are smooth [s].
+    own_cost
+        Of laws that minimise something other than the task's cost; None for the latter.
 
     """
 
@@ -161,10 +163,13 @@ class FreeCourse:
     start: FloatArray
     final: FloatArray
     edges: tuple[float, ...]
+    own_cost: float | None = None
 
     @cached_property
     def cost_value(self) -> float:
-        """Return the sum of the costs, the integrals of Y^T Q Y."""
+        """Return the sum of the costs, the integrals of Y^T Q Y, or the laws' own cost."""
+        if self.own_cost is not None:
+            return self.own_cost
         times, weights = self.quadrature()
         derivatives = self.jets(times)[:, 1:]
         density = np.einsum('vim,ij,vjm->m', derivatives, self.task.cost.matrix, derivatives)

@@ -11,7 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isfinite, log, sqrt
 
-from flat_planner_ros.core.errors import FlatPlannerError, InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import (
+    FlatPlannerError,
+    InvalidRequest,
+    OutOfReach,
+    UncertifiedPlan,
+)
 from flat_planner_ros.core.extrema import Quantity
 from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning import Plan
@@ -175,7 +180,7 @@ class _Search:
             return known
         try:
             plan = self._plan_of(duration)
-        except UncertifiedPlan:
+        except (OutOfReach, UncertifiedPlan):
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
             self._refuse_static_load(plan)

@@ -63,8 +63,7 @@ class EffortProfile:
     times
         Times of the points from the start, increasing, shape (m,) [s].
     efforts
-        Efforts of the actuated joints, exactly zero at the end, shape (m, n-1) [N m]. Where they
-        are not, nobody could know when to let go, and a ramp to zero would be another motion.
+        Efforts of the actuated joints, shape (m, n-1) [N m]; the last ones are held.
     positions, velocities
         Where the arm should be, shape (m, n-1) [rad], [rad/s]; both or only positions or none;
         velocities are zero at the end.
@@ -101,8 +100,6 @@ class EffortProfile:
             raise InvalidCommand(
                 f'efforts must be ({times.size}, n-1) with n >= 2, got shape {efforts.shape}'
             )
-        if efforts[-1].any():
-            raise InvalidCommand(f'the last effort must be 0 N m, got {efforts[-1]}')
         check_bound('effort', efforts, MAX_EFFORT, 'N m')
         if self.velocities is not None and self.positions is None:
             raise InvalidCommand('velocities need positions')

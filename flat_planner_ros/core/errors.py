@@ -37,6 +37,27 @@ class InvalidRequest(FlatPlannerError):
     """The motion asked for has no meaning (not finite, no duration)."""
 
 
+class OutOfReach(InvalidRequest):
+    """
+    No motion meets a bound that was asked for.
+
+    Attributes
+    ----------
+    quantity
+        What is bounded: `effort` [N m] or `residual` [rad].
+    value, limit
+        The best that was found, and the bound.
+
+    """
+
+    def __init__(self, quantity: str, value: float, limit: float, message: str) -> None:
+        """Keep the numbers, so that a caller can report them."""
+        super().__init__(message)
+        self.quantity = quantity
+        self.value = value
+        self.limit = limit
+
+
 class UncertifiedPlan(FlatPlannerError):
     """
     A computed motion law misses the accuracy that a plan promises.

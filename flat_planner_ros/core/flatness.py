@@ -54,6 +54,11 @@ class FlatMap:
         for row in (self.output, self.deflection, self.effort):
             row.setflags(write=False)
 
+    @property
+    def relaxation(self) -> float:
+        """Time constant c_n / k_n of y1 = w + relaxation w'; 0 for the map with y1 = w [s]."""
+        return float(self.output[1]) if len(self.output) > 1 else 0.0
+
 
 def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.EXACT) -> FlatMap:
     """

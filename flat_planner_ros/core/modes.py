@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import zip_longest
+from math import comb
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -69,14 +70,9 @@ class Mode(NamedTuple):
         return Mode(-self.rate, -self.origin, coefficients)
 
     def derivatives(self, order: int) -> ComplexArray:
-        """Return the coefficients of the derivatives in x, shape (k, order + 1)."""
-        table = np.empty((len(self.coefficients), order + 1), dtype=complex)
-        table[:, 0] = self.coefficients
-        powers = np.arange(1, len(self.coefficients))
-        for column in range(1, order + 1):
-            table[:, column] = self.rate * table[:, column - 1]
-            table[:-1, column] += powers * table[1:, column - 1]
-        return table
+        """Return the coefficients of the derivatives in x, shape (terms, order + 1)."""
+        plain = series_derivatives(np.array(self.coefficients), order)
+        return _trimmed(plain @ leibniz(self.rate, order).T, 2.0 if self.origin else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,8 +214,7 @@ def mode_sum(modes: Sequence[Mode], order: int = TOP_ORDER) -> ModeSum:
         elif origin != 0 and len(coefficients) == 1:
             ends.setdefault(origin * rate, [0j, 0j])[origin > 0] += coefficients[0]
         else:
-            reach = 2.0 if origin else 1.0
-            others.append((mode, _trimmed(mode.derivatives(order), reach)))
+            others.append((mode, mode.derivatives(order)))
     decays = np.array(list(ends), dtype=complex)
     table = np.empty((order + 1, len(decays), 2), dtype=complex)
     if len(decays):
@@ -254,7 +249,9 @@ def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
     index, falling = _falling(terms, order)
     padded = np.zeros((*series.shape[:-1], terms + order), dtype=series.dtype)
     padded[..., :terms] = series
-    return np.multiply(padded[..., index], falling, dtype=series.dtype)
+    derivatives: NDArray[Number] = padded[..., index]
+    derivatives *= falling
+    return derivatives
 
 
 def _power_table(series: Sequence[tuple[complex, ...]], order: int) -> FloatArray:
@@ -262,6 +259,25 @@ def _power_table(series: Sequence[tuple[complex, ...]], order: int) -> FloatArra
     terms = zip_longest(*series, fillvalue=0j)
     total = np.array([sum(coefficients).real for coefficients in terms])
     return _trimmed(series_derivatives(total, order), 1.0).T
+
+
+def leibniz(rate: complex, order: int) -> ComplexArray:
+    """Return the factors of f, f', ... in the derivatives of exp(rate u) f at exp(rate u) = 1."""
+    powers = np.empty(order + 2, dtype=complex)
+    powers[0], powers[1:-1], powers[-1] = 1.0, rate, 0.0
+    np.multiply.accumulate(powers, out=powers)
+    binomials, index = _pascal(order)
+    factors: ComplexArray = powers[index]
+    factors *= binomials
+    return factors
+
+
+@cache
+def _pascal(order: int) -> tuple[FloatArray, NDArray[np.int_]]:
+    """Return binomial coefficients (k over j), and k - j or, above the diagonal, order + 1."""
+    k = np.arange(order + 1)
+    index = np.where(k[:, None] >= k, k[:, None] - k, order + 1)
+    return np.array([[float(comb(n, j)) for j in k.tolist()] for n in k.tolist()]), index
 
 
 def _trimmed(table: NDArray[Number], reach: float) -> NDArray[Number]:

@@ -6,14 +6,17 @@ from math import ceil, inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.cost import QuadraticCost
+from flat_planner_ros.core.cost import QuadraticCost, Strategy
 from flat_planner_ros.core.course import Course, FreeCourse, Law, RestToRest
 from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
-from flat_planner_ros.core.flatness import apply_row, FlatMap
+from flat_planner_ros.core.flatness import apply_row, FlatMap, FlatModel
 from flat_planner_ros.core.moving_start import laws_to_rest
 from flat_planner_ros.core.plan_samples import PlanSamples
 from flat_planner_ros.core.request import MotionRequest, PlanningOptions, ViaPoint
+from flat_planner_ros.core.shaped_course import shaped_course
+from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.task import fractions, Task, task_of
+from flat_planner_ros.core.via_points import optimal_path, Path
 import numpy as np
 from numpy.typing import NDArray
 
@@ -218,13 +221,15 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
         The arm does not meet the flatness condition.
     UncertifiedPlan
         The law cannot be computed to the promised accuracy in double precision.
+    OutOfReach
+        No motion meets a bound of the strategy `insensitive`.
 
     """
     _check_fit(request, arm)
     try:
         task = task_of(arm, options, request.duration)
         if request.via:
-            raise InvalidRequest('motions through via points are not available')
+            return _through_points(request, options, task)
         if request.start_jets is not None:
             return _from_motion(request, options, task, request.start_jets)
     except ArithmeticError as error:
@@ -240,16 +245,21 @@ def _from_rest(request: MotionRequest, options: PlanningOptions, task: Task) -> 
     )
     if not all([abs(distance) < task.reach for distance in distances]):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
+    course: Course = RestToRest(task=task, start=start, final=final, distances=distances)
     moves = any(distances)
     boundary = task.unit.boundary_residual if moves else 0.0
     optimality = task.unit.optimality_residual if moves else 0.0
+    if options.strategy is Strategy.INSENSITIVE and distances[0]:
+        if options.flat_model is not FlatModel.EXACT:
+            raise InvalidRequest('strategy insensitive needs flat_model exact')
+        course, boundary, optimality = shaped_course(task, options.insensitivity, start, final)
     _certify('boundary residual', boundary, BOUNDARY_TOLERANCE)
     _certify('optimality residual', optimality, OPTIMALITY_TOLERANCE)
     return Plan(
         request=request,
         options=options,
         task=task,
-        course=RestToRest(task=task, start=start, final=final, distances=distances),
+        course=course,
         boundary_residual=boundary,
         optimality_residual=optimality,
     )
@@ -271,6 +281,32 @@ def _from_motion(
         course=FreeCourse(
             task=task, laws=found.laws, start=start, final=final, edges=(0.0, task.duration)
         ),
+        boundary_residual=found.boundary_residual,
+        optimality_residual=found.optimality_residual,
+    )
+
+
+def _through_points(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
+    """Return a plan whose flat outputs pass given values on the way."""
+    final = np.array(_planned(request.final))
+    start = request.start_jets
+    if start is None:
+        start = np.zeros((len(final), CONDITIONS))
+        start[:, 0] = _planned(request.start)
+    edges = (0.0, *(point.time for point in request.via), task.duration)
+    values = np.column_stack([*(point.values for point in request.via), final])
+    relaxations = np.zeros(len(final))
+    # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
+    relaxations[0] = task.flat_map.relaxation
+    path = Path(edges=np.array(edges), start=start, values=values, relaxations=relaxations)
+    found = optimal_path(task.cost, path)
+    _certify('boundary residual', found.boundary_residual, BOUNDARY_TOLERANCE)
+    _certify('optimality residual', found.optimality_residual, OPTIMALITY_TOLERANCE)
+    return Plan(
+        request=request,
+        options=options,
+        task=task,
+        course=FreeCourse(task=task, laws=found.laws, start=start, final=final, edges=edges),
         boundary_residual=found.boundary_residual,
         optimality_residual=found.optimality_residual,
     )

@@ -1,11 +1,12 @@
 """What is asked of the planner: a motion that ends at rest, and what it minimises."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
 
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.flatness import FlatModel
+from flat_planner_ros.core.insensitivity import Insensitivity
 from flat_planner_ros.core.solutions import CONDITIONS
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +121,8 @@ class PlanningOptions:
         Treatment of the damping of the elastic joint.
     compensate_friction
         Whether the efforts include what the motors' friction takes, as the model has it.
+    insensitivity
+        Uncertainty of the model, and what the strategy `insensitive` makes of it.
 
     """
 
@@ -129,6 +132,7 @@ class PlanningOptions:
     custom: FloatArray | None = None
     flat_model: FlatModel = FlatModel.EXACT
     compensate_friction: bool = False
+    insensitivity: Insensitivity = field(default_factory=Insensitivity)
 
     def __post_init__(self) -> None:
         """Lock a copy of the matrix."""

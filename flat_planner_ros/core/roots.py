@@ -8,14 +8,17 @@ do not (docs/derivation.md, section 5).
 """
 
 from cmath import sqrt
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+Number = TypeVar('Number', np.float64, np.complex128)
 
 LINK = 2.5
 """Roots beta closer than this, in units of 2 / duration, share a cluster [-]."""
@@ -30,7 +33,7 @@ PAIR_RELATIVE_LINK = 0.02
 """The same as a share of their modulus, which bounds the loss in the roots themselves [-]."""
 
 REFINEMENTS = 3
-"""Newton steps on every factor; each about squares the error of the companion eigenvalues."""
+"""Most Newton steps on a factor; each about squares the error of the companion eigenvalues."""
 
 MAX_STEPS = 8
 """Newton steps on a root by itself, which stop earlier once they have converged."""
@@ -76,27 +79,26 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
     if separate is not None:
         return separate
     groups = _groups(np.concatenate([np.zeros(zeros, dtype=complex), squares]))
-    members = [np.array([i - zeros for i in group if i >= zeros], dtype=int) for group in groups]
-    for _ in range(REFINEMENTS):
-        factors = [_refined(reduced, squares, group) for group in members]
-        for group, factor in zip(members, factors, strict=True):
-            squares[group] = np.roots(factor)
-    central_factor = factors[0]
-    around_zero = np.zeros(2 * (len(central_factor) + zeros) - 1, dtype=complex)
-    around_zero[: 2 * len(central_factor) : 2] = central_factor
-    central = Cluster(centre=0j, factor=around_zero)
-    others = (_cluster(squares[group]) for group in members[1:])
-    return [central, *(cluster for cluster in others if cluster is not None)]
+    places = squares.tolist()
+    members = [[places[i - zeros] for i in group if i >= zeros] for group in groups]
+    central, *others = _factors(reduced[::-1].tolist(), members)
+    around_zero = np.zeros(2 * (len(central) + zeros) - 1, dtype=complex)
+    around_zero[: 2 * len(central) : 2] = central
+    found = [_cluster(_roots(factor)) for factor in others]
+    return [
+        Cluster(centre=0j, factor=around_zero),
+        *(cluster for cluster in found if cluster is not None),
+    ]
 
 
-def _companion_roots(ascending: FloatArray) -> ComplexArray:
+def _companion_roots(ascending: NDArray[Number]) -> ComplexArray:
     """Return the roots, conjugates exact; scaled to size one, so that nothing overflows."""
     first = ascending[-2::-1].tolist()
     degree = len(first)
     if degree == 0:
         return np.zeros(0, dtype=complex)
-    scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(first, start=1))
-    companion = np.eye(degree, k=-1)
+    scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(first, start=1)) or 1.0
+    companion = np.eye(degree, k=-1, dtype=ascending.dtype)
     companion[0] = [-a / scale**n for n, a in enumerate(first, start=1)]
     roots: ComplexArray = np.linalg.eigvals(companion).astype(complex)
     roots *= scale
@@ -174,61 +176,123 @@ def _groups(squares: ComplexArray) -> list[list[int]]:
     return groups
 
 
-def _refined(
-    ascending: FloatArray, squares: ComplexArray, group: NDArray[np.int_]
-) -> FloatArray | ComplexArray:
+def _factors(
+    polynomial: Sequence[complex], groups: Sequence[Sequence[complex]]
+) -> list[list[complex]]:
     """
-    Return a group's factor F of the polynomial P after one Newton step, monic and descending.
+    Return the factor of a monic polynomial for each group of its roots, all descending.
+
+    They start from the given roots and are refined by Newton's method, (27) of
+    docs/derivation.md; those of groups that are closed under conjugation are real.
+    """
+    if len(groups) == 1:
+        # Exact: rebuilt from its roots, the factor would lose its smallest coefficients.
+        return [list(polynomial)]
+    factors: list[list[complex]] = [_monic(group) for group in groups]
+    sizes = [max(map(abs, group), default=1.0) for group in groups]
+    is_closed = [_is_conjugate_closed(group) for group in groups]
+    for factor, is_real in zip(factors, is_closed, strict=True):
+        if is_real:
+            factor[:] = [complex(c.real) for c in factor]
+    for _ in range(REFINEMENTS):
+        steps = [_newton_step(polynomial, factors, i, size) for i, size in enumerate(sizes)]
+        largest = 0.0
+        for factor, step, size, is_real in zip(factors, steps, sizes, is_closed, strict=True):
+            for n, change in enumerate(step, start=1):
+                largest = max(largest, abs(change))
+                factor[n] += (change.real if is_real else change) * size**n
+        if largest <= CONVERGED:
+            break
+    return factors
+
+
+def _newton_step(
+    polynomial: Sequence[complex], factors: Sequence[Sequence[complex]], which: int, size: float
+) -> list[complex]:
+    """
+    Return the change of a factor's coefficients below the first, in units of its roots' size.
 
     With P = F G and the remainder R of P by F, the step dF solves G dF = R modulo F.
     """
-    if len(group) == 0:
-        return np.ones(1)
-    if len(group) == len(squares):
-        # Exact: rebuilt from its roots, the factor would lose its smallest coefficients.
-        return ascending[::-1].copy()
-    scale = np.abs(squares[group]).max()
-    inside, outside = squares[group] / scale, np.delete(squares, group) / scale
-    factor = np.poly(inside).astype(complex)
-    # Divided by the far roots, cofactor and lower coefficients stay of size one.
-    size = np.prod(np.maximum(np.abs(outside), 1.0))
-    cofactor = np.atleast_1d(np.poly(outside)) / size
-    degree = len(ascending) - 1
-    scaled = (ascending * scale ** np.arange(-degree, 1.0) / size)[::-1]
-    columns = [_remainder(np.polymul(power, cofactor), factor) for power in np.eye(len(inside))]
-    step = np.linalg.solve(np.array(columns).T, _remainder(scaled, factor))
-    factor[1:] += step
-    factor *= scale ** np.arange(len(factor), dtype=float)
-    # The roots of a real factor come in exact conjugate pairs, which the solver relies on.
-    return factor.real if _is_conjugate_closed(inside) else factor
+    degree = len(factors[which]) - 1
+    if degree == 0:
+        return []
+    factor = [c / size**n for n, c in enumerate(factors[which])]
+    cofactor, far = [1.0 + 0j], 1.0
+    for i, other in enumerate(factors):
+        if i != which:
+            scaled = [c / size**n for n, c in enumerate(other)]
+            # Divided by the far roots, cofactor and lower coefficients stay of size one.
+            largest = max(map(abs, scaled))
+            cofactor = _product(cofactor, [c / largest for c in scaled])
+            far *= largest
+    rest = _remainder([c / size**n / far for n, c in enumerate(polynomial)], factor)
+    columns = []
+    for _ in range(degree):
+        columns.append(_remainder(cofactor, factor))
+        cofactor = [*cofactor, 0j]
+    step: list[complex] = np.linalg.solve(np.array(columns[::-1]).T, rest).tolist()
+    return step
 
 
-def _remainder(dividend: ComplexArray, factor: ComplexArray) -> ComplexArray:
+def _product(a: Sequence[complex], b: Sequence[complex]) -> list[complex]:
+    """Return the product of two polynomials."""
+    product = [0j] * (len(a) + len(b) - 1)
+    for i, left in enumerate(a):
+        for j, right in enumerate(b):
+            product[i + j] += left * right
+    return product
+
+
+def _monic(roots: Iterable[complex]) -> list[complex]:
+    """Return the polynomial with given roots, descending."""
+    product = [1.0 + 0j]
+    for root in roots:
+        product = _product(product, [1.0, -root])
+    return product
+
+
+def _remainder(dividend: Sequence[complex], factor: Sequence[complex]) -> list[complex]:
     """Return dividend modulo a monic factor, descending, one entry less than the factor."""
     # Not np.polydiv, which drops leading entries of the remainder below 1e-8.
     size = len(factor) - 1
-    rest = np.concatenate([np.zeros(max(size - len(dividend), 0)), dividend]).astype(complex)
+    rest = [0j] * (size - len(dividend)) + list(dividend)
     for i in range(len(rest) - size):
-        rest[i + 1 : i + 1 + size] -= rest[i] * factor[1:]
+        for n in range(1, size + 1):
+            rest[i + n] -= rest[i] * factor[n]
     return rest[len(rest) - size :]
 
 
-def _is_conjugate_closed(squares: ComplexArray) -> bool:
+def _roots(factor: list[complex]) -> list[complex]:
+    """Return the roots of a factor; those of a real one come in exact conjugate pairs."""
+    if len(factor) == 2:
+        return [-factor[1]]
+    ascending = np.array(factor[::-1])
+    real = ascending.real
+    found = _companion_roots(ascending) if ascending.imag.any() else _companion_roots(real)
+    roots: list[complex] = found.tolist()
+    return roots
+
+
+def _is_conjugate_closed(squares: Sequence[complex]) -> bool:
     """Tell whether every complex root comes with its conjugate."""
-    return bool(np.array_equal(np.sort_complex(squares), np.sort_complex(squares.conj())))
+    upper = sorted((z.real, z.imag) for z in squares if z.imag > 0.0)
+    lower = sorted((z.real, -z.imag) for z in squares if z.imag < 0.0)
+    return upper == lower
 
 
-def _cluster(squares: ComplexArray) -> Cluster | None:
+def _cluster(squares: Sequence[complex]) -> Cluster | None:
     """Return the representative of a group away from zero, None for the mirror image of one."""
     if not _is_conjugate_closed(squares):
-        if squares.imag.sum() < 0.0:
+        if sum(z.imag for z in squares) < 0.0:
             return None
-        roots = np.sqrt(squares)
-        centre = complex(roots.mean())
-    elif squares.real.sum() > 0.0:
-        roots = np.sqrt(squares)
-        centre = complex(roots.real.mean())
+        roots = [sqrt(z) for z in squares]
+        centre = sum(roots) / len(roots)
+    elif sum(z.real for z in squares) > 0.0:
+        roots = [sqrt(z) for z in squares]
+        centre = complex(sum(root.real for root in roots) / len(roots))
     else:
-        roots = 1j * np.sqrt(-squares)
-        centre = 1j * float(roots.imag.mean())
-    return Cluster(centre=centre, factor=np.poly(roots - centre).astype(complex))
+        roots = [1j * sqrt(-z) for z in squares]
+        centre = 1j * (sum(root.imag for root in roots) / len(roots))
+    factor = np.array(_monic(root - centre for root in roots))
+    return Cluster(centre=centre, factor=factor)

@@ -1,26 +1,36 @@
 """Session of a planner: goals and measurements in, motions out, in the order of time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from math import inf
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
 from flat_planner_ros.core.motion_record import JointSample
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions, PlanSamples
+from flat_planner_ros.core.plan_samples import PlanSamples
+from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
+from flat_planner_ros.core.solutions import CONDITIONS
+from flat_planner_ros.core.stopping import stop_plan
+from flat_planner_ros.core.timeline import Motion, Timeline, Track
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+Clock = Callable[[], float]
+
+HANDOVER = 0.25
+"""Part of the lookahead that is left for a command to reach its executor [-]."""
 
 
 class StartSource(Enum):
     """Where the start of a motion is taken from."""
 
     AUTO = 'auto'
-    """The measured state, as long as no motion is spliced into a running one."""
+    """The measured state, unless another motion is under way or waits for its start."""
 
     MEASURED = 'measured'
     """The measured state of the actuated joints, the elastic one relaxed."""
@@ -58,7 +68,12 @@ class SessionSettings:
     measurement_timeout
         Age from which a measurement is stale [s].
     start_delay
-        From accepting a goal without a stamp to its start [s].
+        From accepting a goal without a stamp to its start, at rest [s].
+    lookahead
+        The same while another motion is under way or waits for its start [s].
+    is_stamped
+        Whether the executor plays a command at its stamp; if it plays on arrival, no motion can
+        take over from another.
     execute
         Whether motions are carried out; if not, none keeps the session busy.
 
@@ -77,6 +92,8 @@ class SessionSettings:
     velocity_tolerance: float = 0.1
     measurement_timeout: float = 0.5
     start_delay: float = 0.05
+    lookahead: float = 0.1
+    is_stamped: bool = True
     execute: bool = True
 
     def __post_init__(self) -> None:
@@ -104,46 +121,53 @@ class SessionSettings:
                 )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class Outcome(Enum):
+    """How an accepted goal ended."""
+
+    FINISHED = 'FINISHED'
+    """At its final pose."""
+
+    STOPPED = 'STOPPED'
+    """At rest on the way."""
+
+    PREEMPTED = 'PREEMPTED'
+    """Replaced by another goal."""
+
+
+class Ended(NamedTuple):
+    """A motion that has ended, and how."""
+
+    motion: Motion
+    outcome: Outcome
+
+
+class Origin(NamedTuple):
     """
-    A plan with its place in time.
+    Where a motion starts.
 
     Attributes
     ----------
-    plan_id
-        Counts the accepted goals from 1.
-    plan
-        What is carried out.
-    samples
-        The plan on the command's grid.
-    start
-        Absolute time of its start [s].
-    planned_at
-        Absolute time at which it was accepted [s].
+    time
+        Absolute [s].
+    pose
+        Angles of all joints, shape (n,) [rad].
+    jets
+        Derivatives 0 to 5 of the planned variables where the arm is planned to move then, shape
+        (n - 1, 6) [rad/s^k]; None at rest.
+    before
+        The motion in force then, if one is.
 
     """
 
-    plan_id: int
-    plan: Plan
-    samples: PlanSamples
-    start: float
-    planned_at: float
-
-    @property
-    def end(self) -> float:
-        """Return the absolute time of its end [s]."""
-        return self.start + self.plan.request.duration
-
-    def reference(self, now: float) -> PlanSamples:
-        """Return what is planned at an absolute time, at rest before and after; one sample."""
-        elapsed = min(max(now - self.start, 0.0), self.plan.request.duration)
-        return self.plan.at(np.array([elapsed]))
+    time: float
+    pose: FloatArray
+    jets: FloatArray | None = None
+    before: Motion | None = None
 
 
 class PlannerSession:
     """
-    Answer goals with motions, one motion at a time.
+    Answer goals with motions; a new one replaces what was planned from its start on.
 
     Parameters
     ----------
@@ -156,9 +180,9 @@ class PlannerSession:
         """Start at rest, without a measurement."""
         self.settings = settings
         self._measured: JointSample | None = None
+        self._timeline = Timeline()
         self._motion: Motion | None = None
-        self._running = False
-        self._is_prompt = False
+        self._ended: list[Ended] = []
         self._count = 0
         self._last_goal: Goal | None = None
 
@@ -186,7 +210,7 @@ class PlannerSession:
         """Take the measured state, in the order of the session's joints."""
         self._measured = sample
 
-    def submit(self, goal: Goal, now: float) -> Motion:
+    def submit(self, goal: Goal, now: float, clock: Clock | None = None) -> Motion:
         """
         Return the motion that answers a goal.
 
@@ -196,68 +220,102 @@ class PlannerSession:
             The request.
         now
             Present time [s].
+        clock
+            Tells the time after planning, which decides when the motion can start; None if
+            planning is to take no time.
 
         Raises
         ------
         RequestRejected
-            The goal breaks a rule; the running motion is untouched.
+            The goal breaks a rule; all that is planned already is untouched.
         FlatPlannerError
             The settings allow no plan.
 
         """
+        _check_time(now)
         settings = self.settings
-        if now <= 0.0:
-            raise RequestRejected(
-                Reason.START_STATE_UNKNOWN,
-                'there is no time yet: use_sim_time is set, but no /clock has been received',
-            )
         target = rest_target(goal, settings.joints)
         duration = self._checked_duration(target.duration)
-        start_time = self._start_time(goal, now)
-        self._refuse_if_busy(now)
-        start = self._start(now)
+        origin = self._origin(goal.stamp, now)
         request = MotionRequest(
-            start=np.array(start), final=np.array(target.positions), duration=duration
+            start=origin.pose,
+            final=np.array(target.positions),
+            duration=duration,
+            start_jets=origin.jets,
         )
-        try:
-            planned = plan(request, settings.arm, settings.options)
-        except UncertifiedPlan as error:
-            raise RequestRejected(
-                Reason.ILL_CONDITIONED,
-                f'no plan to the promised accuracy: {error}; use a longer duration or '
-                f'smaller weights',
-                value=error.residual,
-                limit=error.tolerance,
-            ) from error
-        samples = planned.sample(settings.period)
-        self._count += 1
-        self._motion = Motion(
-            plan_id=self._count, plan=planned, samples=samples, start=start_time, planned_at=now
+        planned = self._planned(request, settings.options, origin)
+        motion = Motion(
+            plan_id=self._count + 1,
+            plan=planned,
+            samples=planned.sample(settings.period),
+            start=origin.time,
+            planned_at=now,
         )
+        motion = self._launched(motion, origin, goal.stamp, clock)
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
-        self._is_prompt = goal.stamp is None
-        self._running = settings.execute
-        return self._motion
-
-    def launched(self, now: float) -> Motion:
-        """
-        Return the motion accepted last, ready to be sent.
-
-        Planning takes time: a motion that starts as soon as possible starts start_delay from now.
-        """
-        motion = self._motion
-        if motion is None:
-            raise RequestRejected(Reason.EMPTY_GOAL, 'no goal has been accepted yet')
-        if self._is_prompt:
-            self._motion = motion = replace(motion, start=now + self.settings.start_delay)
         return motion
 
-    def finished(self, now: float) -> Motion | None:
-        """Return the running motion once, at the first call after its end."""
-        if self._motion is None or not self._running or now < self._motion.end:
+    def stop(self, now: float, clock: Clock | None = None) -> Motion | None:
+        """
+        Return the motion that brings the arm to rest early, None if nothing is under way.
+
+        Parameters
+        ----------
+        now, clock
+            As for `submit`.
+
+        Raises
+        ------
+        RequestRejected
+            The arm cannot be brought to rest any sooner; all that is planned is untouched.
+
+        """
+        _check_time(now)
+        if not self._timeline.is_busy(now):
             return None
-        self._running = False
-        return self._motion
+        origin = self._origin(None, now)
+        running = origin.before
+        if running is None or running.stops or (origin.jets is None and now >= running.start):
+            raise RequestRejected(
+                Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
+            )
+        planned = stop_plan(running.plan, origin.pose, origin.jets, running.end - origin.time)
+        motion = Motion(
+            plan_id=running.plan_id,
+            plan=planned,
+            samples=planned.sample(self.settings.period),
+            start=origin.time,
+            planned_at=now,
+            stops=True,
+        )
+        return self._launched(motion, origin, None, clock)
+
+    def ended(self, now: float) -> list[Ended]:
+        """Return, once, the motions that have come to an end or been replaced."""
+        ended = [
+            Ended(motion, Outcome.STOPPED if motion.stops else Outcome.FINISHED)
+            for motion in self._timeline.motions
+            if motion.cut is None and motion.end <= now
+        ]
+        ended += self._ended
+        self._ended = []
+        self._timeline = self._timeline.after(now)
+        return ended
+
+    def track(self, now: float) -> Track:
+        """Return all that is still to be carried out, as an executor is to be sent it."""
+        if self.settings.execute or self._motion is None:
+            return self._timeline.track(now)
+        return Timeline([self._motion]).track(now)
+
+    def moves(self, since: float, until: float) -> bool:
+        """Tell whether any motion is planned for part of a time [s]."""
+        return self._timeline.moves(since, until)
+
+    def reference(self, now: float) -> PlanSamples | None:
+        """Return what is planned for the present, at rest before and after; one sample."""
+        motion = self._timeline.at(now) or self._motion
+        return None if motion is None else motion.reference(now)
 
     def _checked_duration(self, prescribed: float | None) -> float:
         """Return the duration of a goal, within its range."""
@@ -281,31 +339,94 @@ class PlannerSession:
             )
         return duration
 
-    def _start_time(self, goal: Goal, now: float) -> float:
-        """Return the absolute time at which a goal's motion starts."""
-        if goal.stamp is None:
-            return now + self.settings.start_delay
-        if goal.stamp < now:
+    def _planned(self, request: MotionRequest, options: PlanningOptions, origin: Origin) -> Plan:
+        """Return a plan that is good to the promised accuracy."""
+        arm = self.settings.arm
+        if origin.jets is not None and origin.before is not None:
+            # What the arm is planned to do then is said in terms of the model it was planned with.
+            arm = origin.before.plan.task.arm
+            options = replace(options, flat_model=origin.before.plan.options.flat_model)
+        try:
+            return plan(request, arm, options)
+        except OutOfReach as error:
+            raise RequestRejected(
+                Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
+            ) from error
+        except UncertifiedPlan as error:
+            raise RequestRejected(
+                Reason.ILL_CONDITIONED,
+                f'no plan to the promised accuracy: {error}; use a longer duration or '
+                f'smaller weights',
+                value=error.residual,
+                limit=error.tolerance,
+            ) from error
+
+    def _launched(
+        self, motion: Motion, origin: Origin, stamp: float | None, clock: Clock | None
+    ) -> Motion:
+        """Return a motion with its place in time, which it takes unless planning took too long."""
+        settings = self.settings
+        now = motion.planned_at if clock is None else clock()
+        if origin.before is None:
+            if stamp is None:
+                motion = replace(motion, start=now + settings.start_delay)
+            elif stamp < now:
+                raise _too_late(stamp, now)
+        elif origin.time - now < HANDOVER * settings.lookahead and clock is not None:
+            raise RequestRejected(
+                Reason.BUSY,
+                f'planning took {now - motion.planned_at:.3f} s, too long for a start in motion '
+                f'{settings.lookahead:g} s ahead (replan.lookahead); the motion goes on',
+                value=now - motion.planned_at,
+                limit=(1.0 - HANDOVER) * settings.lookahead,
+            )
+        if settings.execute:
+            for old in self._timeline.replaced(motion.start):
+                if not (motion.stops and old.plan_id == motion.plan_id):
+                    self._ended.append(Ended(old, Outcome.PREEMPTED))
+            self._timeline = self._timeline.with_motion(motion)
+        self._count = motion.plan_id if not motion.stops else self._count
+        self._motion = motion
+        return motion
+
+    def _origin(self, stamp: float | None, now: float) -> Origin:
+        """Return where a motion starts."""
+        settings = self.settings
+        if stamp is not None and stamp < now:
+            raise _too_late(stamp, now)
+        if not self._timeline.is_busy(now):
+            time = now + settings.start_delay if stamp is None else stamp
+            return Origin(time, np.array(self._start(now)))
+        if not settings.is_stamped:
+            raise RequestRejected(
+                Reason.BUSY,
+                'another motion is under way; none can take over from it as commands have no '
+                'stamp (command.stamp)',
+            )
+        soonest = now + settings.lookahead
+        time = self._timeline.seam(soonest) if stamp is None else stamp
+        before = self._timeline.at(time)
+        if before is None:  # is_busy says otherwise
+            raise RequestRejected(Reason.INTERNAL, 'there is no motion to start from')
+        elapsed = time - before.start
+        if elapsed <= 0.0:
+            return Origin(time, before.plan.request.start, before=before)
+        if time >= before.end:
+            return Origin(time, before.plan.request.final, before=before)
+        if time < soonest:
             raise RequestRejected(
                 Reason.OLD_HEADER_TIMESTAMP,
-                f'the stamp {goal.stamp:.3f} s lies {now - goal.stamp:.3f} s in the past; 0 means '
-                f'as soon as possible',
-                value=goal.stamp,
-                limit=now,
+                f'motion {before.plan_id} is under way: another one can take over from '
+                f'{soonest:.3f} s on (replan.lookahead), not at {time:.3f} s',
+                value=time,
+                limit=soonest,
             )
-        return goal.stamp
-
-    def _refuse_if_busy(self, now: float) -> None:
-        """Let the running motion, or one that waits for its start, come to its end first."""
-        if self._motion is None or not self._running or now >= self._motion.end:
-            return
-        remaining = self._motion.end - now
-        raise RequestRejected(
-            Reason.BUSY,
-            f'motion {self._motion.plan_id} ends in {remaining:.3f} s; re-planning in motion is '
-            f'not available in this version',
-            value=now,
-            limit=self._motion.end,
+        times = np.array([elapsed])
+        return Origin(
+            time,
+            before.plan.at(times).positions[0],
+            before.plan.jets(times)[:, :CONDITIONS, 0],
+            before,
         )
 
     def _start(self, now: float) -> Sequence[float]:
@@ -377,3 +498,23 @@ class PlannerSession:
                     value=float(velocity),
                     limit=settings.velocity_tolerance,
                 )
+
+
+def _check_time(now: float) -> None:
+    """Refuse to plan before there is a time."""
+    if now <= 0.0:
+        raise RequestRejected(
+            Reason.START_STATE_UNKNOWN,
+            'there is no time yet: use_sim_time is set, but no /clock has been received',
+        )
+
+
+def _too_late(stamp: float, now: float) -> RequestRejected:
+    """Return the refusal of a start in the past."""
+    return RequestRejected(
+        Reason.OLD_HEADER_TIMESTAMP,
+        f'the stamp {stamp:.3f} s lies {now - stamp:.3f} s in the past; 0 means as soon as '
+        f'possible',
+        value=stamp,
+        limit=now,
+    )

@@ -59,7 +59,8 @@ class SimulatedArm:
     The true arm: its full dynamics, integrated in fixed Runge-Kutta steps of fourth order.
 
     Time lies on a grid: the start plus a whole number of steps, so that it never drifts. An arm
-    that runs away, beyond MAX_SPEED, is stopped where it is until it is reset.
+    that runs away, beyond MAX_SPEED, is stopped where it is until it is reset. An arm that gravity
+    would move has brakes: it stands while there is no command, and until its first one starts.
 
     Parameters
     ----------
@@ -189,6 +190,9 @@ class SimulatedArm:
         motors = self._arm.n - 1
         if profile.motors != motors:
             raise InvalidCommand(f'the arm has {motors} motors, the command {profile.motors}')
+        if profile.efforts[-1].any() and not self._arm.has_weight:
+            # Nobody could know when to let go, and a ramp to zero would be another motion.
+            raise InvalidCommand(f'the last effort must be 0 N m, got {profile.efforts[-1]}')
         if profile.end <= self.time:
             raise InvalidCommand(
                 f'the command ended at {profile.end:.6f} s, before the present {self.time:.6f} s'
@@ -196,6 +200,8 @@ class SimulatedArm:
         if self._has_feedback and profile.positions is None:
             raise InvalidCommand('feedback needs a command with positions')
         self._profile = profile.taken_over(now, self._reference(now).effort)
+        if self._is_braked:
+            self._braked_until = profile.start
 
     def hold(self, effort: npt.ArrayLike, until: float = inf) -> None:
         """
@@ -221,10 +227,14 @@ class SimulatedArm:
             raise InvalidCommand(f'effort must have {self._arm.n - 1} entries, got {held.shape}')
         check_bound('effort', held, MAX_EFFORT, 'N m')
         self._profile, self._held, self._held_until = None, held, until
+        self._braked_until = -inf
 
     def release(self) -> None:
-        """Apply nothing until the next command."""
+        """Apply nothing until the next command; an arm with weight stands by its brakes."""
         self._profile, self._held, self._held_until = None, self._nothing, inf
+        self._braked_until = -inf
+        if self._arm.has_weight:
+            self._braked_until, self._velocity = inf, np.zeros(self._arm.n)
 
     def take_expired(self) -> bool:
         """Return whether a held effort other than zero has ended, and forget that it has."""
@@ -255,8 +265,18 @@ class SimulatedArm:
             reference = self._advance_once(reference)
         return steps
 
+    @property
+    def _is_braked(self) -> bool:
+        """Whether brakes hold the arm in the step from now on."""
+        return self.time < self._braked_until - GRID_TOLERANCE * self._step
+
     def _advance_once(self, start: JointReference) -> JointReference:
         """Take one step; return the reference at its end, where the next step starts."""
+        if self._braked_until != -inf:
+            if self._is_braked:
+                self._count += 1
+                return self._reference(self.time)
+            self._braked_until = -inf
         h, q, dq = self._step, self._position, self._velocity
         middle = self._reference(self._origin + (self._count + 0.5) * h)
         self._count += 1

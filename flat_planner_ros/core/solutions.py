@@ -10,7 +10,7 @@ from cmath import exp
 from functools import cache, lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.modes import series_derivatives
+from flat_planner_ros.core.modes import leibniz, Number, series_derivatives
 from flat_planner_ros.core.roots import Cluster
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +56,7 @@ class Block(NamedTuple):
     columns: list[list[float]]
     rate: complex
     origin: int
-    series: ComplexArray | None
+    series: FloatArray | ComplexArray | None
 
     def combined(self, weights: list[float]) -> tuple[complex, ...]:
         """Return the coefficients of a combination of the solutions."""
@@ -72,19 +72,20 @@ def block_of(cluster: Cluster, parity: float) -> Block:
         return _central(cluster.factor.real.tobytes(), parity)
     if centre.real != 0.0 and len(cluster.factor) == 2 and cluster.factor[1] == 0.0:
         return _exponentials(centre, parity)
-    series = _power_series(cluster.factor)
+    table = unit_solutions(cluster.factor, SERIES_LENGTH)
     if centre.real == 0.0:
         # conj(f_j(-x)) = (-1)^j f_j(x): Re f_j has the parity of j, Im f_j the other one.
-        even = np.arange(len(series)) % 2 == 0
-        series = np.where(even == (parity > 0.0), 1.0, -1j)[:, None] * series
-        ends, origin = _derivatives(centre, series, 1.0), 0
+        even = np.arange(len(table)) % 2 == 0
+        table = np.where(even == (parity > 0.0), 1.0, -1j)[:, None] * table
+        series, origin = table / _factorials(SERIES_LENGTH), 0
+        ends = _derivatives(centre, series, 1.0)
     else:
         if centre.imag != 0.0:
-            series = np.concatenate([series, -1j * series])
-        ends, origin = _derivatives(centre, series, 0.0), 1
+            table = np.concatenate([table, -1j * table])
+        series, origin = table / _factorials(SERIES_LENGTH), 1
+        ends = table[:, :CONDITIONS] @ leibniz(centre, CONDITIONS - 1).T
         if centre.real < FAR:
-            image = _derivatives(centre, series, -2.0)
-            ends = ends + parity * ALTERNATING * image
+            ends = ends + parity * ALTERNATING * _derivatives(centre, series, -2.0)
     growth = max(1.0, abs(centre), _spread(cluster.factor))
     return Block(growth, ends.real.tolist(), centre, origin, series)
 
@@ -92,11 +93,15 @@ def block_of(cluster: Cluster, parity: float) -> Block:
 @lru_cache(maxsize=CENTRES_KEPT)
 def _central(factor: bytes, parity: float) -> Block:
     """Return the solutions around zero; a law with fast roots has just a power or two there."""
-    coefficients = np.frombuffer(factor).astype(complex)
-    # The equation of this cluster is even itself: every second solution has the parity.
-    series = _power_series(coefficients)[(0 if parity > 0.0 else 1) :: 2]
-    columns = _derivatives(0j, series, 1.0).real.tolist()
-    return Block(max(1.0, _spread(coefficients)), columns, 0j, 0, series)
+    # The equation is even itself: from one power to the next but one it is of half the degree.
+    even = np.frombuffer(factor)
+    terms = np.zeros((len(even) // 2, SERIES_LENGTH))
+    half = unit_solutions(even[::2], SERIES_LENGTH // 2)
+    terms[:, (0 if parity > 0.0 else 1) :: 2] = half
+    last = np.flatnonzero(terms.any(axis=0))[-1]
+    series = terms[:, : last + 1] / _factorials(SERIES_LENGTH)[: last + 1]
+    columns = series_derivatives(series, CONDITIONS - 1).sum(axis=1).tolist()
+    return Block(max(1.0, _spread(even)), columns, 0j, 0, series)
 
 
 def _exponentials(beta: complex, parity: float) -> Block:
@@ -115,50 +120,50 @@ def _exponentials(beta: complex, parity: float) -> Block:
 
 def _derivatives(rate: complex, series: ComplexArray, u: float) -> ComplexArray:
     """Return the derivatives 0 to 5 of exp(rate u) times power series at u, shape (rows, 6)."""
-    powers = u ** np.arange(series.shape[1], dtype=float)
     table = series_derivatives(series, CONDITIONS - 1)  # (rows, terms, 6)
-    plain = np.einsum('rtk,t->rk', table, powers)
-    # Leibniz's rule, one order at a time.
-    binomial = np.zeros((CONDITIONS, CONDITIONS), dtype=complex)
-    binomial[0, 0] = exp(rate * u)
-    for k in range(1, CONDITIONS):
-        binomial[k] = rate * binomial[k - 1]
-        binomial[k, 1:] += binomial[k - 1, :-1]
-    result: ComplexArray = plain @ binomial.T
+    powers = u ** np.arange(series.shape[1], dtype=float)
+    result: ComplexArray = exp(rate * u) * (powers @ table) @ leibniz(rate, CONDITIONS - 1).T
     return result
 
 
-def _spread(factor: ComplexArray) -> float:
+def _spread(factor: NDArray[Number]) -> float:
     """Return a bound on the distance of a factor's roots from its centre, within 2 (Fujiwara)."""
     sizes = np.abs(factor[1:]).tolist()
     return float(max(size ** (1.0 / n) for n, size in enumerate(sizes, start=1)))
 
 
-def _power_series(factor: ComplexArray) -> ComplexArray:
+def unit_solutions(factor: NDArray[Number], terms: int) -> NDArray[Number]:
     """
-    Return the solutions of a cluster's own equation as power series.
+    Return the derivatives at 0 of the solutions of an equation with unit initial values.
 
     Parameters
     ----------
     factor
         Monic characteristic polynomial, descending, shape (m + 1,).
+    terms
+        Derivatives wanted, more than m.
 
     Returns
     -------
-    ComplexArray
-        Row j has its j-th derivative 1 and all others below m zero at 0, shape (m, terms).
+    NDArray
+        Row j: the solution whose j-th derivative is 1 and all others below m are zero, shape
+        (m, terms).
 
     """
     size = len(factor) - 1
-    table = np.zeros((size, SERIES_LENGTH), dtype=complex)
+    table = np.zeros((size, terms), dtype=factor.dtype)
     table[:, :size] = np.eye(size)
-    tail = -factor[:0:-1]
-    if tail.any():
-        for k in range(size, SERIES_LENGTH):
-            table[:, k] = table[:, k - size : k] @ tail
-    else:
-        table = table[:, :size]
-    return np.asarray(table / _factorials(table.shape[1]), dtype=complex)
+    if not factor[1:].any():
+        return table
+    table[:, size] = -factor[:0:-1]
+    known = size + 1
+    while known < terms:
+        # The equation shifts with time: m derivatives in a row begin a known solution each.
+        shift = known - size
+        more = min(known, terms - shift)
+        table[:, known : shift + more] = table[:, shift:known] @ table[:, size:more]
+        known = shift + more
+    return table
 
 
 @cache

@@ -13,17 +13,17 @@ from flat_planner_ros.core import (
     InvalidCommand,
     InvalidRequest,
     JointSample,
-    Motion,
     PlannedMotion,
     PlanSamples,
     Residual,
     select,
+    Track,
 )
 from flat_planner_ros.ros.point_writer import NANOSECONDS, trajectory_bytes
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
+from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory
 
 FloatArray = NDArray[np.float64]
@@ -224,30 +224,34 @@ def profile_from_trajectory(
 
 
 def command_bytes(
-    motion: Motion,
+    track: Track,
     joints: Sequence[str],
     *,
     include_passive_joint: bool = True,
     include_effort: bool = True,
     absolute_stamp: bool = True,
 ) -> bytes:
-    """Return the command of a motion, serialised, as joint_trajectory_controller plays it."""
-    samples = motion.samples
+    """Return a command, serialised, as joint_trajectory_controller plays it."""
     count = len(joints) if include_passive_joint else len(joints) - 1
-    tables = [samples.positions, samples.velocities, samples.accelerations]
+    tables = [track.positions, track.velocities, track.accelerations]
     if include_effort:
-        tables.append(samples.efforts)
-    start = motion.start if absolute_stamp else 0.0
+        tables.append(track.efforts)
+    start = track.start if absolute_stamp else 0.0
     tables = [table[:, :count] for table in tables]
-    return trajectory_bytes(joints[:count], _split(start), samples.times, tables)
+    return trajectory_bytes(joints[:count], _split(start), track.times, tables)
 
 
-def flat_plan_bytes(motion: Motion) -> bytes:
-    """Return the flat outputs of a motion and the higher derivatives of y1, serialised."""
-    flat = motion.samples.flat
+def flat_plan_bytes(track: Track) -> bytes:
+    """Return the flat outputs of a command and the higher derivatives of y1, serialised."""
+    flat = track.flat
     names = [f'y{k + 1}' for k in range(len(flat))] + ['y1_d3']
     tables = [np.vstack([flat[:, k], flat[0, k + 3]]).T for k in range(3)]
-    return trajectory_bytes(names, _split(motion.start), motion.samples.times, tables)
+    return trajectory_bytes(names, _split(track.start), track.times, tables)
+
+
+def effort_msg(efforts: FloatArray) -> Float64MultiArray:
+    """Return efforts of the actuated joints."""
+    return Float64MultiArray(data=_doubles(efforts))
 
 
 def reference_msg(samples: PlanSamples, joints: Sequence[str], now: float) -> JointState:

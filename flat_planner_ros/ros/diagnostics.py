@@ -6,10 +6,15 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.core import (
     ActuatedJoints,
     Adoption,
+    advice,
+    baselines,
+    Ended,
     Goal,
     InvalidRequest,
     Level,
     Motion,
+    Outcome,
+    predicted_residual,
     ReportedEstimate,
     RequestRejected,
     StiffnessEstimate,
@@ -31,6 +36,13 @@ LEVELS = {
     Level.STALE: DiagnosticStatus.STALE,
 }
 """Levels of a report as diagnostics state them."""
+
+ENDINGS = {
+    Outcome.FINISHED: 'has come to its end',
+    Outcome.STOPPED: 'has been brought to rest on the way',
+    Outcome.PREEMPTED: 'is replaced by a later goal',
+}
+"""What a verdict says of each end of a motion."""
 
 Values = Mapping[str, float | int | str | None]
 """Keys and values of a status; None for what is not known."""
@@ -58,7 +70,13 @@ def status_msg(name: str, level: bytes, message: str, values: Values) -> Diagnos
 
 
 def accepted_status(
-    motion: Motion, goal: Goal, joints: Sequence[str], planning_time: float
+    motion: Motion,
+    goal: Goal,
+    joints: Sequence[str],
+    planning_time: float,
+    *,
+    with_advice: bool = True,
+    with_baselines: bool = False,
 ) -> DiagnosticStatus:
     """
     Return the verdict on a goal that became a motion.
@@ -71,6 +89,8 @@ def accepted_status(
         The arm's joints, whose order the plan's arrays follow.
     planning_time
         What it took [s].
+    with_advice, with_baselines
+        Whether to say when more time pays, and what simpler methods would leave behind.
 
     """
     plan = motion.plan
@@ -85,6 +105,7 @@ def accepted_status(
         'boundary_residual': plan.boundary_residual,
         'optimality_residual': plan.optimality_residual,
         'cost': plan.cost_value,
+        **_of_residual(motion, with_advice=with_advice, with_baselines=with_baselines),
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
         values.update(_per_joint(quantity, joints, getattr(plan, quantity).tolist()))
@@ -106,10 +127,11 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
     return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
 
 
-def finished_status(motion: Motion) -> DiagnosticStatus:
-    """Return the notice that a motion has come to its planned end."""
-    message = f'plan {motion.plan_id} finished after {motion.plan.request.duration:g} s'
-    values = _of_motion(motion, 'FINISHED')
+def ended_status(ended: Ended) -> DiagnosticStatus:
+    """Return the notice that a motion has ended, and how."""
+    motion, outcome = ended
+    message = f'plan {motion.plan_id} {ENDINGS[outcome]}'
+    values = _of_motion(motion, outcome.value)
     return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
 
 
@@ -229,6 +251,28 @@ def _of_estimate(estimate: StiffnessEstimate | None) -> Values:
         'estimate_basis': estimate.case.value,
         'estimate_inertia': estimate.inertia,
     }
+
+
+def _of_residual(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:
+    """Return what a motion is predicted to leave behind, and what others would."""
+    try:
+        residual = predicted_residual(motion.plan, motion.samples)
+    except InvalidRequest:
+        return {}  # an arm that does not oscillate leaves nothing to predict
+    box = residual.box
+    values: dict[str, float | int | str | None] = {
+        'predicted_residual': residual.nominal,
+        'predicted_residual_worst': residual.worst,
+        'predicted_residual_box': f'stiffness +-{100.0 * box.stiffness:g} %, '
+        f'damping +-{100.0 * box.damping:g} %',
+        'advice': advice(motion.plan, residual) if with_advice else None,
+    }
+    if with_baselines:
+        for point in baselines(motion.plan):
+            values[f'baseline.{point.series}.rms_effort'] = point.rms_effort
+            values[f'baseline.{point.series}.residual'] = point.nominal
+            values[f'baseline.{point.series}.residual_worst'] = point.worst
+    return values
 
 
 def _per_joint(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:

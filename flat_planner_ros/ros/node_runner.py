@@ -4,6 +4,7 @@ from argparse import ArgumentParser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import os
+import re
 import signal
 import sys
 from threading import Event
@@ -12,6 +13,7 @@ from flat_planner_ros.core import FlatPlannerError
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -25,6 +27,12 @@ HINTS = {
     'Error opening YAML file': ' (no such file)',
 }
 """What to write instead, by a part of what rcl says of a parameter file."""
+
+SOURCE_PLACE = re.compile(r',? at /\S+:\d+')
+"""Where in its own sources rcl has met an error."""
+
+RCL = 'rcl'
+"""Logger of the client library below rclpy."""
 
 SPIN_PERIOD = 0.1
 """Longest wait in the executor [s]; without one an EventsExecutor would never run a callback."""
@@ -49,30 +57,55 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
 
     """
     nodes: list[Node] = []
+    is_open = is_ready = False
     with _signals_caught() as interrupted:
         try:
-            # RuntimeError is what rcl raises for arguments and parameter files it cannot read.
-            try:
-                _refuse_strays(sys.argv if args is None else args)
-                rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-                executor = _new_executor()
-                for create in creators:
-                    nodes.append(create())
-                    executor.add_node(nodes[-1])
-            except (FlatPlannerError, ParameterException, RuntimeError) as error:
-                text = ' '.join(str(error).split())
-                hint = next((hint for part, hint in HINTS.items() if part in text), '')
-                print(f'cannot start: {text}{hint}', file=sys.stderr)
-                return 1
+            _refuse_strays(sys.argv if args is None else args)
+            _init(args)
+            is_open = True
+            executor = _new_executor()
+            for create in creators:
+                if interrupted.is_set():
+                    return 0
+                nodes.append(create())
+                executor.add_node(nodes[-1])
+            for node in nodes:
+                node.get_logger().info('ready')
+            is_ready = True
             while rclpy.ok() and not interrupted.is_set():
                 executor.spin_once(timeout_sec=SPIN_PERIOD)
         except ExternalShutdownException:
             pass
+        # RuntimeError is what rcl raises for arguments and parameter files it cannot read, and for
+        # whatever is attempted in a context that has been shut down.
+        except (FlatPlannerError, ParameterException, RuntimeError) as error:
+            if not is_open or rclpy.ok():
+                if is_ready:
+                    raise
+                return _explained(error)
         finally:
             for node in nodes:
                 node.destroy_node()
             rclpy.try_shutdown()
     return 0
+
+
+def _explained(error: Exception) -> int:
+    """Print why there are no nodes; return the exit code."""
+    text = SOURCE_PLACE.sub('', ' '.join(str(error).split()))
+    hint = next((hint for part, hint in HINTS.items() if part in text), '')
+    print(f'cannot start: {text}{hint}', file=sys.stderr)
+    return 1
+
+
+def _init(args: Sequence[str] | None) -> None:
+    """Open the default context; complaints come as exceptions alone, not as log entries too."""
+    set_logger_level(RCL, LoggingSeverity.FATAL)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    finally:
+        if get_logger_level(RCL) == LoggingSeverity.FATAL:  # not what --log-level has asked for
+            set_logger_level(RCL, LoggingSeverity.UNSET)
 
 
 def _refuse_strays(args: Sequence[str]) -> None:

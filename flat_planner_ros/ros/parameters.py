@@ -13,7 +13,13 @@ from math import inf, isfinite, isnan
 import sys
 from typing import Any, Generic, TypeVar
 
-from flat_planner_ros.core import FlatPlannerError, PlanarArm
+from flat_planner_ros.core import (
+    displaced_com,
+    FlatPlannerError,
+    NotFlat,
+    PlanarArm,
+    remedy,
+)
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
@@ -118,7 +124,7 @@ class Row:
             is_number = isfinite(number) or (self.infinite and not isnan(number))
             if not (is_number and self.lower <= number <= self.upper):
                 raise InvalidParameter(
-                    f'{self.name} must be {self.constraints or "finite"}, got {number:g}'
+                    f'{self.name} must be {self.constraints or "finite"}, got {number}'
                 )
 
 
@@ -253,9 +259,18 @@ EXAMPLE_ARM: Values = {
 """The paper's arm, for nodes that are started without any model (config/arm_2dof.yaml)."""
 
 
-def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
+def arm_of(
+    values: Values, imbalance: Sequence[float] = (0.0, 0.0)
+) -> tuple[tuple[str, ...], PlanarArm]:
     """
-    Return the joint names and the nominal model.
+    Return the joint names and the arm.
+
+    Parameters
+    ----------
+    values
+        The nominal model.
+    imbalance
+        What the last two links of the true arm lack of balance, as for `displaced_com` [kg m].
 
     Raises
     ------
@@ -301,7 +316,19 @@ def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
         arm = PlanarArm.from_links(**links, **common)
     if arm.n != len(joints):
         raise InvalidParameter(f'{len(joints)} joints are named, but the model has {arm.n}')
-    arm.check_flat()
+    try:
+        arm.check_flat()
+    except NotFlat as error:
+        mended = remedy(**{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'})
+        raise NotFlat(error.link, error.static_moment, f'{error}; {mended}') from error
+    if any(imbalance):
+        if reduced:
+            raise InvalidParameter(
+                'an imbalance needs the model in its full form: the reduced one does not know '
+                'the masses of the last two links'
+            )
+        com = displaced_com(links['link_com'], links['link_mass'], imbalance)
+        arm = PlanarArm.from_links(**{**links, 'link_com': com}, **common)
     return joints, arm
 
 
@@ -339,7 +366,7 @@ def _declare(node: Node, row: Row, default: Any) -> None:
         node.declare_parameter(row.name, default, row.descriptor())
     except InvalidParameterValueException as error:
         value = node._parameter_overrides[row.name].value
-        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value:g}') from error
+        raise InvalidParameter(f'{row.name} must be {row.constraints}, got {value}') from error
     except InvalidParameterTypeException as error:
         raise wrong_type(row, node._parameter_overrides[row.name].value) from error
 

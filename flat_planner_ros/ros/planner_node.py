@@ -10,17 +10,19 @@ from flat_planner_ros.core import (
     FlatPlannerError,
     Goal,
     ModelTuner,
-    Motion,
     PlannerSession,
     Reason,
     RequestRejected,
+    Track,
 )
 from flat_planner_ros.ros import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.effort_stream import EffortStream
 from flat_planner_ros.ros.node_runner import run
 from flat_planner_ros.ros.parameters import model_parameters, NodeParameters
 from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -37,10 +39,13 @@ class PlannerNode(Node):
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         self._tuner = ModelTuner()
+        self._sent: Track | None = None
         publish = self.create_publisher
         self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
         self._flat_plan = publish(JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED)
+        efforts = publish(Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE)
+        self._efforts = EffortStream(self, efforts, self._session)
         self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
         self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.LATCHED_HISTORY)
         listen = self.create_subscription
@@ -53,6 +58,12 @@ class PlannerNode(Node):
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
         self.create_service(Trigger, interfaces.STOP, self._on_stop)
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
+        self._apply(self._settings)
+
+    def destroy_node(self) -> None:
+        """End the stream of efforts with zeros, then the node."""
+        self._efforts.end()
+        super().destroy_node()
 
     @property
     def _settings(self) -> PlannerSettings:
@@ -71,6 +82,7 @@ class PlannerNode(Node):
     def _apply(self, settings: PlannerSettings) -> None:
         """Plan the next goals with changed parameters."""
         self._session.settings = settings.session
+        self._efforts.configure(settings.stream_effort, settings.session.period)
 
     def _on_goal(self, msg: JointTrajectory) -> None:
         """Answer a goal given as a trajectory."""
@@ -99,8 +111,8 @@ class PlannerNode(Node):
         if estimate is None:
             return
         self._tuner.hear(estimate)
-        motion = self._session.motion
-        if self._settings.auto_tune and motion is not None and estimate.is_of(motion.start):
+        sent = self._sent
+        if self._settings.auto_tune and sent is not None and estimate.is_of(sent.start):
             try:
                 self._adopt()
             except AdoptionRefused as refusal:
@@ -137,27 +149,44 @@ class PlannerNode(Node):
         return response
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Say that a motion cannot be cut short yet."""
-        response.success = False
-        response.message = 'stopping in motion is not available in this version'
+        """Bring the arm to rest early."""
+        try:
+            motion = self._session.stop(self._now(), self._now)
+        except FlatPlannerError as error:
+            response.success = False
+            response.message = f'not stopped: {error}'
+            return response
+        response.success = True
+        if motion is None:
+            response.message = 'nothing to stop: no motion is under way'
+            return response
+        self._publish_motion()
+        response.message = (
+            f'plan {motion.plan_id} comes to rest {motion.end - self._now():.3f} s from now'
+        )
+        self.get_logger().info(response.message)
+        self._report_ended()
         return response
 
     def _on_tick(self) -> None:
         """Publish what is planned for now, and the end of a motion."""
+        self._report_ended()
         now = self._now()
-        finished = self._session.finished(now)
-        if finished is not None:
-            self._publish_status(diagnostics.finished_status(finished))
-        if self._session.motion is not None:
-            samples = self._session.motion.reference(now)
+        samples = self._session.reference(now)
+        if samples is not None:
             self._reference.publish(conversions.reference_msg(samples, self._joints, now))
+
+    def _report_ended(self) -> None:
+        """Publish how motions have ended."""
+        for ended in self._session.ended(self._now()):
+            self._publish_status(diagnostics.ended_status(ended))
 
     def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
         """Give a goal exactly one verdict and, if it is accepted, carry it out."""
         goal, started = None, perf_counter()
         try:
             goal = read()
-            self._session.submit(goal, self._now())
+            motion = self._session.submit(goal, self._now(), self._now)
         except RequestRejected as error:
             status = diagnostics.rejected_status(error, goal)
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
@@ -166,31 +195,39 @@ class PlannerNode(Node):
             status = diagnostics.rejected_status(rejection, goal)
         else:
             elapsed = perf_counter() - started
-            motion = self._session.launched(self._now())
             # The verdict's peaks take a while: the plant need not wait for them.
-            self._publish_motion(motion)
-            status = diagnostics.accepted_status(motion, goal, self._joints, elapsed)
+            self._publish_motion()
+            status = diagnostics.accepted_status(
+                motion,
+                goal,
+                self._joints,
+                elapsed,
+                with_advice=self._settings.report_advice,
+                with_baselines=self._settings.report_baselines,
+            )
         self._publish_status(status)
+        self._report_ended()
         return status
 
-    def _publish_motion(self, motion: Motion) -> None:
-        """Publish the command first: its start is near."""
+    def _publish_motion(self) -> None:
+        """Publish all that is still to be carried out, the command first: its start is near."""
         settings = self._settings
-        plan = conversions.command_bytes(motion, self._joints)
+        track = self._sent = self._session.track(self._now())
+        plan = conversions.command_bytes(track, self._joints)
         if settings.session.execute:
             is_whole = settings.include_passive_joint and settings.include_effort
             command = plan
-            if not (is_whole and settings.absolute_stamp):
+            if not (is_whole and settings.session.is_stamped):
                 command = conversions.command_bytes(
-                    motion,
+                    track,
                     self._joints,
                     include_passive_joint=settings.include_passive_joint,
                     include_effort=settings.include_effort,
-                    absolute_stamp=settings.absolute_stamp,
+                    absolute_stamp=settings.session.is_stamped,
                 )
             self._command.publish(command)
         self._plan.publish(plan)
-        self._flat_plan.publish(conversions.flat_plan_bytes(motion))
+        self._flat_plan.publish(conversions.flat_plan_bytes(track))
 
     def _publish_status(self, status: DiagnosticStatus) -> None:
         """Publish and log a verdict."""

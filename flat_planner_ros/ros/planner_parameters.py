@@ -9,11 +9,13 @@ from flat_planner_ros.core import (
     MAX_WEIGHT,
     PlanningOptions,
     QuadraticCost,
+    rehearse,
     SessionSettings,
     StartSource,
     Strategy,
     strategy_cost,
 )
+from flat_planner_ros.ros.insensitivity_parameters import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
 import numpy as np
 from rclpy.parameter import Parameter
@@ -28,21 +30,27 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
-    include_passive_joint, include_effort, absolute_stamp
+    include_passive_joint, include_effort
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
+    report_advice, report_baselines
+        What the verdict on a goal says besides.
+    stream_effort
+        Whether `~/effort_commands` is published.
 
     """
 
     session: SessionSettings
     include_passive_joint: bool
     include_effort: bool
-    absolute_stamp: bool
     reference_rate: float
     auto_tune: bool
+    report_advice: bool
+    report_baselines: bool
+    stream_effort: bool
 
 
 ROWS = [
@@ -72,6 +80,7 @@ ROWS = [
         default=Parameter.Type.DOUBLE_ARRAY,
         description='36 numbers, row by row: the cost of the strategy custom',
     ),
+    *INSENSITIVITY_ROWS,
     Row(
         name='flat_model',
         default=FlatModel.EXACT.value,
@@ -158,6 +167,13 @@ ROWS = [
         lower=0.0,
     ),
     Row(
+        name='replan.lookahead',
+        default=0.1,
+        description='from accepting a goal while the arm moves to the start of its motion [s]',
+        lower=0.01,
+        upper=10.0,
+    ),
+    Row(
         name='execute',
         default=True,
         description='publish commands; false = plan and report only',
@@ -192,9 +208,19 @@ ROWS = [
         description='adopt each trustworthy estimate that the monitor makes after a motion',
     ),
     Row(
+        name='report_advice',
+        default=True,
+        description='say in the verdict on a goal when a little more time would pay',
+    ),
+    Row(
+        name='report_baselines',
+        default=False,
+        description='state in the verdict on a goal what simpler methods would leave behind',
+    ),
+    Row(
         name='stream_effort',
         default=False,
-        description='stream ~/effort_commands; not yet available',
+        description='publish ~/effort_commands every sampling.period while the arm moves',
     ),
 ]
 """All parameters of the planner node."""
@@ -219,7 +245,12 @@ def build(values: Values) -> PlannerSettings:
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
+        insensitivity=insensitivity_of(values),
     )
+    if options.strategy is Strategy.INSENSITIVE:
+        if options.flat_model is not FlatModel.EXACT:
+            raise InvalidParameter('strategy insensitive needs flat_model: exact')
+        rehearse(arm, options.insensitivity)
     # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
     strategy_cost(
         options.strategy,
@@ -242,15 +273,19 @@ def build(values: Values) -> PlannerSettings:
         velocity_tolerance=values['start.velocity_tolerance'],
         measurement_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
+        lookahead=values['replan.lookahead'],
+        is_stamped=values['command.stamp'] == 'absolute',
         execute=values['execute'],
     )
     return PlannerSettings(
         session=session,
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
-        absolute_stamp=values['command.stamp'] == 'absolute',
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
+        report_advice=values['report_advice'],
+        report_baselines=values['report_baselines'],
+        stream_effort=values['stream_effort'],
     )
 
 
@@ -267,8 +302,6 @@ def _custom_cost(values: Values) -> np.ndarray | None:
 
 def _refuse_unavailable(values: Values) -> None:
     """Refuse what a later version will do, rather than ignore it."""
-    if values['stream_effort']:
-        raise InvalidParameter('stream_effort is not available in this version, set it to false')
     for name, value in values.items():
         if name.startswith('limits.') and not all(abs(number) == inf for number in value):
             raise InvalidParameter(

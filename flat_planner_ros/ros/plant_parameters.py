@@ -116,6 +116,13 @@ ROWS = [
         for quantity, lower in (('stiffness', 1e-3), ('damping', 0.0), ('inertia', 1e-3))
     ),
     Row(
+        name='mismatch.imbalance',
+        default=DOUBLES,
+        description='static moments that links n-1 and n have too much [kg m]; full form only',
+        lower=-1e3,
+        upper=1e3,
+    ),
+    Row(
         name='torque.saturation',
         default=DOUBLES,
         description='largest effort per actuated joint [N m]; none by default',
@@ -168,7 +175,12 @@ def build(values: Values) -> PlantSettings:
         They contradict each other or the model.
 
     """
-    joints, arm = arm_of(values)
+    imbalance = values.get('mismatch.imbalance', (0.0, 0.0))
+    if len(imbalance) != 2:
+        raise InvalidParameter(
+            f'mismatch.imbalance needs two numbers, for links n-1 and n, got {len(imbalance)}'
+        )
+    joints, arm = arm_of(values, imbalance)
     publish_clock, factor = values['publish_clock'], values['real_time_factor']
     if factor != 1.0 and not publish_clock:
         raise InvalidParameter(

@@ -5,11 +5,13 @@ from math import nan, pi
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
+from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import PlanningOptions
-from flat_planner_ros.core.session import PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import Outcome, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.simulation import SimulatedArm
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ SETTINGS = SessionSettings(
 )
 NOW = 100.0
 GOAL = Goal(joint_names=('joint1',), points=(GoalPoint(time=1.0, positions=(pi,)),))
+BACK = replace(GOAL, points=(GoalPoint(time=1.0, positions=(0.0,)),))
 
 
 def sample(position=(0.5, 0.0), velocity=(0.0, 0.0), time=NOW) -> JointSample:
@@ -51,12 +54,12 @@ def test_a_motion_goes_from_the_measured_start_to_the_goal():
 
 
 def test_planning_time_does_not_eat_the_start_delay():
-    planner = session()
-    planner.submit(GOAL, NOW)
-    assert planner.launched(NOW + 2.0).start == NOW + 2.0 + SETTINGS.start_delay
-    planner = session()
-    planner.submit(replace(GOAL, stamp=NOW + 7.0), NOW)
-    assert planner.launched(NOW + 2.0).start == NOW + 7.0
+    motion = session().submit(GOAL, NOW, lambda: NOW + 2.0)
+    assert motion.start == NOW + 2.0 + SETTINGS.start_delay
+    stamped = replace(GOAL, stamp=NOW + 7.0)
+    assert session().submit(stamped, NOW, lambda: NOW + 2.0).start == NOW + 7.0
+    error = reason_of(session().submit, stamped, NOW, lambda: NOW + 8.0)
+    assert error.reason is Reason.OLD_HEADER_TIMESTAMP
 
 
 def test_a_small_measured_deflection_does_not_enter_the_plan():
@@ -91,23 +94,212 @@ def test_a_duration_outside_the_range_is_refused(time, limit):
     assert (error.value, error.limit) == (time, limit)
 
 
-def test_a_goal_in_motion_is_refused_and_disturbs_nothing():
+def test_a_motion_ends_once():
     planner = session()
     motion = planner.submit(GOAL, NOW)
-    planner.measure(sample(time=motion.end - 0.01))
-    assert reason_of(planner.submit, GOAL, motion.end - 0.01).reason is Reason.BUSY
-    assert planner.motion is motion
-    assert planner.finished(motion.end - 0.01) is None
-    assert planner.finished(motion.end) is motion
-    assert planner.finished(motion.end + 1.0) is None
+    assert planner.ended(motion.end - 0.01) == []
+    assert planner.ended(motion.end) == [(motion, Outcome.FINISHED)]
+    assert planner.ended(motion.end + 1.0) == []
+
+
+def test_a_goal_in_motion_takes_over_without_a_step():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    now = first.start + 0.4321
+    second = planner.submit(BACK, now)
+    # A point that is sent anyway, at least the lookahead ahead.
+    assert 0.0 <= second.start - now - SETTINGS.lookahead <= SETTINGS.period
+    there = first.plan.at(np.array([second.start - first.start]))
+    for quantity in ('positions', 'velocities', 'accelerations', 'efforts'):
+        before, after = getattr(there, quantity)[0], getattr(second.samples, quantity)[0]
+        scale = np.abs(getattr(first.samples, quantity)).max()
+        assert after == pytest.approx(before, abs=1e-9 * scale)
+    assert second.samples.positions[-1].tolist() == [0.0, 0.0]
+    assert planner.ended(now) == [(first, Outcome.PREEMPTED)]
+    assert planner.ended(second.end) == [(second, Outcome.FINISHED)]
+
+
+def test_what_is_being_played_stays_as_it_is():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    now = first.start + 0.4321
+    second = planner.submit(BACK, now)
+    track = planner.track(now)
+    origin = round((track.start - first.start) / SETTINGS.period)
+    assert now - SETTINGS.period < track.start <= now
+    seam = round((second.start - track.start) / SETTINGS.period)
+    for quantity in ('positions', 'velocities', 'accelerations', 'efforts'):
+        sent = getattr(track, quantity)
+        assert (sent[:seam] == getattr(first.samples, quantity)[origin : origin + seam]).all()
+        assert (sent[seam:] == getattr(second.samples, quantity)).all()
+    assert track.times[0] == 0.0
+    assert np.diff(track.times) == pytest.approx(SETTINGS.period, abs=1e-6)
+    assert track.flat.shape == (1, 6, len(track.times))
+
+
+def test_a_stamp_in_motion_is_kept_to_the_last_bit():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    stamp = first.start + 0.61234
+    second = planner.submit(replace(BACK, stamp=stamp), first.start + 0.1)
+    assert second.start == stamp
+    times = planner.track(first.start + 0.1).times
+    assert (np.diff(times) > 0.0).all()
+    error = reason_of(planner.submit, replace(BACK, stamp=stamp + 0.02), stamp)
+    assert error.reason is Reason.OLD_HEADER_TIMESTAMP
+    assert error.limit == pytest.approx(stamp + SETTINGS.lookahead)
+
+
+def test_goals_queue_by_their_stamps():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    second = planner.submit(replace(BACK, stamp=first.end + 0.5), NOW)
+    third = planner.submit(replace(GOAL, stamp=second.end), NOW)
+    assert second.samples.positions[0].tolist() == [pi, 0.0]
+    assert third.samples.positions[0].tolist() == [0.0, 0.0]
+    track = planner.track(NOW)
+    assert track.start == first.start
+    assert track.start + track.times[-1] == pytest.approx(third.end)
+    assert (np.diff(track.times) > 0.0).all()
+    assert planner.reference(first.end + 0.25).positions[0].tolist() == [pi, 0.0]
+    assert planner.ended(first.end + 0.25) == [(first, Outcome.FINISHED)]
+    assert planner.ended(third.end) == [(second, Outcome.FINISHED), (third, Outcome.FINISHED)]
+
+
+def test_a_goal_replaces_all_that_was_planned_from_its_start_on():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    second = planner.submit(replace(BACK, stamp=first.end + 0.5), NOW)
+    third = planner.submit(replace(BACK, stamp=second.end + 0.5), NOW)
+    now = first.end + 0.1
+    last = planner.submit(replace(GOAL, stamp=second.start + 0.3), now)
+    assert planner.ended(now) == [
+        (first, Outcome.FINISHED),
+        (second, Outcome.PREEMPTED),
+        (third, Outcome.PREEMPTED),
+    ]
+    assert planner.track(now).times[-1] == pytest.approx(last.end - second.start)
+
+
+def test_a_motion_that_waits_for_its_start_gives_way():
+    planner = session()
+    first = planner.submit(replace(GOAL, stamp=NOW + 10.0), NOW)
+    second = planner.submit(GOAL, NOW + 1.0)
+    assert second.start == pytest.approx(NOW + 1.0 + SETTINGS.lookahead)
+    assert second.samples.positions[0].tolist() == [0.5, 0.0]
+    assert planner.ended(NOW + 1.0) == [(first, Outcome.PREEMPTED)]
+
+
+def test_commands_without_a_stamp_cannot_be_spliced():
+    planner = session(is_stamped=False)
+    first = planner.submit(GOAL, NOW)
+    assert reason_of(planner.submit, BACK, first.end - 0.2).reason is Reason.BUSY
+    assert reason_of(planner.stop, first.end - 0.2).reason is Reason.BUSY
+    planner.measure(sample(position=(pi, 0.0), time=first.end))
+    assert planner.submit(BACK, first.end).plan_id == 2
+
+
+def test_planning_that_takes_too_long_leaves_the_motion_alone():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    now = first.start + 0.3
+    track = planner.track(now)
+    error = reason_of(planner.submit, BACK, now, lambda: now + 0.09)
+    assert error.reason is Reason.BUSY
+    assert planner.motion is first
+    assert planner.ended(now) == []
+    assert (planner.track(now).efforts == track.efforts).all()
+    assert planner.submit(BACK, now, lambda: now + 0.05).plan_id == 2
+
+
+@pytest.mark.parametrize('elapsed', [0.05, 0.3, 0.5, 0.8])
+def test_a_stop_comes_to_rest_early_with_bounded_effort(elapsed):
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    now = first.start + elapsed
+    stop = planner.stop(now)
+    assert stop.end < first.end
+    track = planner.track(now)
+    assert not track.velocities[-1].any()
+    assert not track.efforts[-1].any()
+    assert track.positions[-1, 1] == 0.0
+    peak = np.abs(first.samples.efforts).max()
+    assert np.abs(stop.samples.efforts).max() <= 2.0 * peak
+    assert planner.ended(stop.end) == [(stop, Outcome.STOPPED)]
+
+
+def test_a_stop_of_a_motion_that_waits_stays_at_the_start():
+    planner = session()
+    planner.submit(replace(GOAL, stamp=NOW + 10.0), NOW)
+    stop = planner.stop(NOW + 1.0)
+    assert (stop.samples.positions == [0.5, 0.0]).all()
+    assert not stop.samples.efforts.any()
+    assert planner.ended(stop.end) == [(stop, Outcome.STOPPED)]
+
+
+def test_a_stop_may_be_overtaken_by_a_goal():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    stop = planner.stop(first.start + 0.3)
+    second = planner.submit(BACK, first.start + 0.35)
+    assert planner.ended(first.start + 0.35) == [(stop, Outcome.PREEMPTED)]
+    assert planner.ended(second.end) == [(second, Outcome.FINISHED)]
+
+
+def test_there_is_nothing_to_stop_at_rest():
+    planner = session()
+    assert planner.stop(NOW) is None
+    end = planner.submit(GOAL, NOW).end
+    assert reason_of(planner.stop, end - 0.01).reason is Reason.BUSY
+    assert planner.stop(end) is None
+
+
+def residual(track, arm) -> float:
+    """Return what a command leaves behind on the simulated arm, the amplitude of q_n [rad]."""
+    plant = SimulatedArm(arm, step=2.5e-4)
+    plant.reset(track.positions[0])
+    plant.command(EffortProfile(start=0.0, times=track.times, efforts=track.efforts[:, :-1]), 0.0)
+    plant.advance(track.times[-1])
+    mode = arm.natural_mode()
+    angle, rate = plant.position[-1], plant.velocity[-1]
+    return float(np.hypot(angle, (rate + mode.decay_rate * angle) / mode.damped_frequency))
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_chain_of_goals_leaves_no_more_than_one(seed):
+    random = np.random.default_rng(seed)
+    planner = session()
+    now = planner.submit(GOAL, NOW).start
+    tracks = [planner.track(NOW)]
+    for _ in range(10):
+        now += random.uniform(0.05, 0.9)
+        point = GoalPoint(time=random.uniform(0.7, 1.5), positions=(random.uniform(-pi, pi),))
+        planner.submit(replace(GOAL, points=(point,)), now)
+        planner.ended(now)
+        tracks.append(planner.track(now))
+    assert residual(spliced(tracks), SETTINGS.arm) < 1e-5
+
+
+def spliced(tracks):
+    """Return what an executor has played that takes over every command on arrival."""
+    begin, times, efforts = tracks[0].start, [], []
+    for track, after in zip(tracks, [*tracks[1:], None], strict=True):
+        until = np.inf if after is None else after.start - track.start - 1e-7
+        chosen = track.times < until
+        times.append(track.times[chosen] + (track.start - begin))
+        efforts.append(track.efforts[chosen])
+    return replace(
+        tracks[0],
+        times=np.concatenate(times),
+        efforts=np.concatenate(efforts),
+    )
 
 
 def test_a_new_goal_is_answered_after_the_end():
     planner = session()
     end = planner.submit(GOAL, NOW).end
     planner.measure(sample(position=(pi, 0.0), time=end))
-    back = replace(GOAL, points=(replace(GOAL.points[0], positions=(0.0,)),))
-    second = planner.submit(back, end)
+    second = planner.submit(BACK, end)
     assert second.plan_id == 2
     assert second.samples.positions[0, 0] == pi
 
@@ -116,7 +308,8 @@ def test_plans_that_are_not_executed_keep_nothing_busy():
     planner = session(execute=False)
     first = planner.submit(GOAL, NOW)
     assert planner.submit(GOAL, NOW).plan_id == first.plan_id + 1
-    assert planner.finished(first.end) is None
+    assert planner.ended(first.end) == []
+    assert planner.track(NOW).times[-1] == 1.0
 
 
 def test_the_last_goal_is_planned_again_with_changed_settings():

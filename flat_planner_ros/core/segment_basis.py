@@ -1,0 +1,115 @@
+"""
+Basis of a segment: the twelve solutions of the Euler-Lagrange equation between two via points.
+
+Unlike a whole motion from rest to rest, a segment meets no condition at its ends by itself; its
+neighbours share them. What the coupling needs are the derivatives of every solution at both ends,
+up to the eleventh ((V4) of docs/derivation.md).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from flat_planner_ros.core.modes import Mode, series_derivatives
+from flat_planner_ros.core.roots import clusters
+from flat_planner_ros.core.solutions import ALTERNATING, Block, block_of, CONDITIONS
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+SOLUTIONS = 2 * CONDITIONS
+"""Solutions of the equation, and derivatives of each that are coupled: orders 0 to 11."""
+
+BASES_KEPT = 256
+"""Bases that are remembered: those of several paths of fifty via points."""
+
+_MIRRORED = np.tile(ALTERNATING, 2)
+
+_ALONE = np.array([[1.0 + 0.0j], [-1j]])
+"""Series of one exponential: its real and its imaginary part."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SegmentBasis:
+    """
+    Solutions on a segment, in normalised time x from -1 to 1.
+
+    Attributes
+    ----------
+    groups
+        Blocks of solutions, each with whether its mirror image is meant; columns below follow
+        this order.
+    at_start, at_end
+        Derivatives 0 to 11 of every solution at x = -1 and x = 1, shape (12, 12) [-].
+    rates
+        How fast solutions of one parity grow with the order of the derivative, ascending, at
+        least 1, shape (6,) [-].
+
+    """
+
+    groups: tuple[tuple[Block, bool], ...]
+    at_start: FloatArray
+    at_end: FloatArray
+    rates: FloatArray
+
+    def modes(self, weights: FloatArray) -> tuple[Mode, ...]:
+        """Return the modes of a combination of the solutions, shape of the weights (12,)."""
+        modes, first, numbers = [], 0, weights.tolist()
+        for block, is_image in self.groups:
+            last = first + len(block.columns)
+            mode = Mode(block.rate, block.origin, block.combined(numbers[first:last]))
+            modes.append(mode.mirrored(1.0) if is_image else mode)
+            first = last
+        return tuple(modes)
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def segment_basis(key: bytes) -> SegmentBasis:
+    """
+    Return the solutions of an equation.
+
+    Parameters
+    ----------
+    key
+        The bytes of the coefficients a_0 ... a_6 in normalised time.
+
+    """
+    found = sorted(clusters(np.frombuffer(key)), key=lambda cluster: abs(cluster.centre))
+    groups: list[tuple[Block, bool]] = []
+    rates: list[float] = []
+    starts, ends = [], []
+    for cluster in found:
+        even = block_of(cluster, 1.0)
+        rates += [even.growth] * len(even.columns)
+        if even.origin == 0:
+            for block in (even, block_of(cluster, -1.0)):
+                groups.append((block, False))
+                starts.append(_derivatives(block, -1.0))
+                ends.append(_derivatives(block, 1.0))
+            continue
+        near, far = _derivatives(even, 0.0), _derivatives(even, -2.0)
+        # Each solution by itself, not odd and even ones: a boundary layer stays at its own end.
+        groups += [(even, False), (even, True)]
+        starts += [far, _MIRRORED * near]
+        ends += [near, _MIRRORED * far]
+    return SegmentBasis(
+        groups=tuple(groups),
+        at_start=np.concatenate(starts).T,
+        at_end=np.concatenate(ends).T,
+        rates=np.array(sorted(rates)),
+    )
+
+
+def _derivatives(block: Block, u: float) -> FloatArray:
+    """Return derivatives 0 to 11 of a block's solutions at a distance from their origin."""
+    series = _ALONE[: len(block.columns)] if block.series is None else block.series
+    powers = u ** np.arange(series.shape[1], dtype=float)
+    # Leibniz's rule, one order at a time: (D + rate)^k applied to the series.
+    plain = np.einsum('rtk,t->rk', series_derivatives(series, SOLUTIONS - 1), powers)
+    binomial = np.zeros((SOLUTIONS, SOLUTIONS), dtype=complex)
+    with np.errstate(under='ignore'):
+        binomial[0, 0] = np.exp(block.rate * u)
+        for k in range(1, SOLUTIONS):
+            binomial[k] = block.rate * binomial[k - 1]
+            binomial[k, 1:] += binomial[k - 1, :-1]
+        return np.asarray((plain @ binomial.T).real)

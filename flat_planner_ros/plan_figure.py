@@ -1,0 +1,49 @@
+"""Figure of one plan: positions, velocities and efforts of all joints over time."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flat_planner_ros.core import Track
+import matplotlib
+
+matplotlib.use('Agg')
+from matplotlib import pyplot as plt  # noqa: E402  The backend is chosen before.
+
+ROWS = (
+    ('positions', 'position [rad]'),
+    ('velocities', 'velocity [rad/s]'),
+    ('efforts', 'effort [N m]'),
+)
+"""Tables that are drawn, one above the other."""
+
+
+def draw_plan(track: Track, joints: Sequence[str], path: Path) -> None:
+    """
+    Write a figure.
+
+    Parameters
+    ----------
+    track
+        What is drawn.
+    joints
+        Names of its columns, the passive joint last.
+    path
+        File, of a kind that matplotlib knows.
+
+    """
+    figure, axes = plt.subplots(len(ROWS), 1, sharex=True, figsize=(7.0, 7.0))
+    for axis, (quantity, label) in zip(axes, ROWS, strict=True):
+        table = getattr(track, quantity)
+        for index, name in enumerate(joints):
+            if quantity == 'efforts' and index == len(joints) - 1:
+                continue
+            axis.plot(track.times, table[:, index], label=name)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    axes[0].legend(frameon=False)
+    axes[-1].set_xlabel('time [s]')
+    axes[-1].set_xlim(track.times[0], track.times[-1])
+    figure.align_ylabels(axes)
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    plt.close(figure)

@@ -1,0 +1,54 @@
+"""
+Entry points of the programs: signals count before the libraries are loaded.
+
+Loading them takes most of a second. A SIGINT or SIGTERM ends a program in that time as later on:
+at once, with exit code 0 and without a word.
+"""
+
+from importlib import import_module
+import os
+import signal
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""What ends a program."""
+
+
+def planner_node() -> int:
+    """Run the planner node."""
+    return _run('planner_node')
+
+
+def plant_node() -> int:
+    """Run the plant node."""
+    return _run('plant_node')
+
+
+def monitor_node() -> int:
+    """Run the monitor node."""
+    return _run('monitor_node')
+
+
+def demo() -> int:
+    """Run the three nodes."""
+    return _run('demo')
+
+
+def _run(module: str) -> int:
+    """Load a module of the ROS layer and run its `main`; return the exit code."""
+    for number in SIGNALS:
+        signal.signal(number, _leave)
+    try:
+        # From here on, while the nodes exist, the module catches signals by itself.
+        return int(import_module(f'flat_planner_ros.ros.{module}').main())
+    finally:
+        # A late signal must not spoil the exit code while the interpreter is taken down.
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+
+
+def _leave(_number: int, _frame: FrameType | None) -> None:
+    """End a process that has nothing to be cleaned up yet, or nothing any more."""
+    # No exception: it would come up in the middle of an import, where some libraries turn it
+    # into another one.
+    os._exit(0)

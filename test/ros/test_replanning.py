@@ -1,0 +1,174 @@
+"""New goals, stops and streams while the arm moves, through the three nodes."""
+
+from math import pi
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros.monitor_node import MonitorNode
+from flat_planner_ros.ros.planner_node import PlannerNode
+from flat_planner_ros.ros.plant_node import PlantNode
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+SPEED = 0.5
+"""
+Simulated seconds per second.
+
+What is handed over in motion must arrive within the lookahead, however busy the machine is.
+"""
+
+LOOKAHEAD = 0.25
+"""Time between a goal in motion and its start [s], half a second of real time."""
+
+
+class Arm:
+    """The three nodes on one graph, the plant owning the time."""
+
+    def __init__(self, graph, planner=None, plant=None):
+        """Start them and wait until they have found each other."""
+        self.graph = graph
+        simulated = {'use_sim_time': True}
+        slow = {'reference_rate': 20.0, 'start_delay': 0.2, 'replan.lookahead': LOOKAHEAD}
+        clock = {'publish_clock': True, 'real_time_factor': SPEED}
+        self.planner = graph.create(PlannerNode, {**simulated, **slow, **(planner or {})})
+        self.monitor = graph.create(MonitorNode, {**simulated, 'window': 1.0})
+        self.plant = graph.create(PlantNode, {**clock, **(plant or {})})
+        self.status = graph.collect(
+            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
+        )
+        self.reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
+        self.commands = graph.collect(
+            JointTrajectory, '/flat_planner/joint_trajectory', interfaces.RELIABLE
+        )
+        self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
+        graph.expect(
+            lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
+            'the three nodes on joint_states',
+        )
+
+    def now(self) -> float:
+        """Return the time of the last joint state [s]."""
+        return conversions.seconds(self.states[-1].header.stamp)
+
+    def wait_until(self, time: float) -> None:
+        """Wait for a time of the plant's clock."""
+        self.graph.expect(lambda: self.now() >= time, f'{time} s', timeout=60.0)
+
+    def send(self, angle: float, duration: float = 1.0) -> dict[str, str]:
+        """Send a goal and return its verdict."""
+        before = len(self.verdicts('ACCEPTED', 'REJECTED'))
+        point = JointTrajectoryPoint(
+            positions=[float(angle)], time_from_start=conversions.duration_msg(duration)
+        )
+        goal = JointTrajectory(joint_names=['joint1'], points=[point])
+        self.graph.publish('/flat_planner/goal', goal)
+        self.graph.expect(lambda: len(self.verdicts('ACCEPTED', 'REJECTED')) > before, 'a verdict')
+        return self.verdicts('ACCEPTED', 'REJECTED')[before]
+
+    def verdicts(self, *states: str) -> list[dict[str, str]]:
+        """Return the values of all verdicts with one of these states."""
+        found = [
+            {pair.key: pair.value for pair in message.status[0].values} for message in self.status
+        ]
+        return [values for values in found if values['state'] in states]
+
+    def residual(self) -> float:
+        """Return the amplitude that the last motion has left, from the monitor [rad]."""
+        self.graph.expect(lambda: self.reports, 'a report', timeout=60.0)
+        report = {pair.key: pair.value for pair in self.reports[-1].status[0].values}
+        return float(report['amplitude'])
+
+
+@pytest.mark.timeout(240)
+def test_ten_goals_at_random_moments_of_motion_leave_no_more_than_one(graph):
+    random = np.random.default_rng(7)
+    arm = Arm(graph)
+    verdict = arm.send(pi)
+    for _ in range(10):
+        arm.wait_until(float(verdict['start_time']) + random.uniform(0.05, 0.6))
+        verdict = arm.send(random.uniform(-pi, pi), random.uniform(0.8, 1.2))
+        assert verdict['state'] == 'ACCEPTED'
+    arm.wait_until(float(verdict['start_time']) + float(verdict['duration']) + 0.1)
+    graph.expect(lambda: arm.verdicts('FINISHED'), 'the end')
+    assert len(arm.verdicts('PREEMPTED')) == 10
+    ids = [values['plan_id'] for values in arm.verdicts('PREEMPTED')]
+    assert ids == [str(number) for number in range(1, 11)]
+    assert arm.verdicts('FINISHED')[0]['plan_id'] == '11'
+    assert arm.residual() < 1e-5
+    last = arm.states[-1]
+    assert last.position[0] == pytest.approx(arm.commands[-1].points[-1].positions[0], abs=1e-3)
+
+
+def test_the_command_goes_on_as_it_was_until_the_new_motion_takes_over(graph):
+    arm = Arm(graph)
+    first = arm.send(pi)
+    arm.wait_until(float(first['start_time']) + 0.3)
+    second = arm.send(0.0)
+    graph.expect(lambda: len(arm.commands) == 2, 'both commands')
+    old, new = arm.commands
+    seam = float(second['start_time'])
+    played = {time: point.effort[0] for time, point in points(old)}
+    kept = [(time, point.effort[0]) for time, point in points(new) if time < seam - 1e-6]
+    assert len(kept) >= int(LOOKAHEAD / 0.005)
+    for time, effort in kept:
+        nearest = min(played, key=lambda other, time=time: abs(other - time))
+        assert abs(nearest - time) < 1e-6
+        assert played[nearest] == effort
+    after = next(point.effort[0] for time, point in points(new) if time >= seam - 1e-6)
+    nearest = min(played, key=lambda other: abs(other - seam))
+    assert after == pytest.approx(played[nearest], abs=1e-7)
+
+
+def test_a_stop_brings_the_arm_to_rest_without_oscillation(graph):
+    arm = Arm(graph)
+    first = arm.send(2.0 * pi, 2.0)
+    arm.wait_until(float(first['start_time']) + 0.5)
+    response = graph.call(Trigger, '/flat_planner/stop')
+    assert response.success
+    assert 'comes to rest' in response.message
+    graph.expect(lambda: arm.verdicts('STOPPED'), 'the stop', timeout=30.0)
+    assert arm.verdicts('STOPPED')[0]['plan_id'] == first['plan_id']
+    assert arm.residual() < 1e-5
+    stop = arm.verdicts('STOPPED')[0]
+    assert float(stop['start_time']) + float(stop['duration']) < float(first['start_time']) + 2.0
+    assert 0.3 < arm.states[-1].position[0] < 2.0 * pi - 0.3
+    assert graph.call(Trigger, '/flat_planner/stop').message.startswith('nothing to stop')
+
+
+def test_efforts_are_streamed_while_the_arm_moves_and_end_with_zeros(graph):
+    arm = Arm(graph, planner={'stream_effort': True})
+    stream = graph.collect(Float64MultiArray, '/flat_planner/effort_commands', interfaces.RELIABLE)
+    first = arm.send(pi)
+    arm.wait_until(float(first['start_time']) + 1.2)
+    efforts = np.array([list(message.data) for message in stream])
+    assert efforts.shape[1] == 1
+    moving = np.flatnonzero(efforts[:, 0])
+    # Some periods may be merged on a busy machine.
+    assert 100 < len(moving) <= 202
+    assert np.abs(efforts).max() == pytest.approx(float(first['peak_effort.joint1']), rel=0.02)
+    assert len(efforts) - 1 - moving[-1] == 10
+    assert not efforts[-1].any()
+
+
+def test_a_stream_of_efforts_moves_the_arm_as_well_as_its_jitter_allows(graph):
+    arm = Arm(
+        graph,
+        planner={'stream_effort': True},
+        plant={'input': 'effort', 'input_timeout': 0.5},
+    )
+    arm.send(pi)
+    # 5 ms of jitter leave up to 1.5e-3 rad, and a busy machine may have more; none leaves 7e-7.
+    assert arm.residual() < 0.02
+    assert arm.states[-1].position[0] == pytest.approx(pi, abs=0.2)
+    assert arm.states[-1].effort[0] == 0.0
+
+
+def points(command: JointTrajectory):
+    """Yield absolute times [s] and points."""
+    start = conversions.seconds(command.header.stamp)
+    for point in command.points:
+        yield start + conversions.seconds(point.time_from_start), point

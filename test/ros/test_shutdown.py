@@ -1,0 +1,123 @@
+"""SIGINT, SIGTERM and a shutdown of the context end every program in every state: 0, no word."""
+
+import os
+from pathlib import Path
+import signal
+import sys
+from time import monotonic
+
+import pytest
+
+CODE = 'import sys; from flat_planner_ros.programs import {0}; sys.exit({0}())'
+"""What an installed console script does."""
+
+PROGRAMS = ('planner_node', 'plant_node', 'monitor_node', 'demo')
+
+MOMENTS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 2.0)
+"""From catching signals to the first one [s]: imports, the opening of the graph, spinning."""
+
+SHUTDOWN = """
+import sys, threading
+from flat_planner_ros.ros.plant_node import main
+import rclpy
+threading.Timer({delay}, rclpy.try_shutdown).start()
+sys.exit(main())
+"""
+
+
+def start(graph, name, *arguments):
+    """Start a program as its console script does, and wait until it catches signals."""
+    process = graph.run([sys.executable, '-c', CODE.format(name), *arguments])
+    graph.expect(lambda: catches(process.pid, signal.SIGTERM), 'a handler of signals')
+    return process
+
+
+def catches(pid: int, number: int) -> bool:
+    """Return whether a process has a handler for a signal."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith('SigCgt:'):
+            return bool(int(line.split()[1], 16) >> (number - 1) & 1)
+    return False
+
+
+def pause(graph, seconds: float) -> None:
+    """Let a time pass; what happens in it may be anything."""
+    end = monotonic() + seconds
+    graph.spin_until(lambda: monotonic() >= end, seconds + 1.0)
+
+
+def assert_clean(process) -> None:
+    """Look at what a process leaves behind."""
+    assert process.wait() == 0, process.stderr
+    words = [line for line in process.stderr.splitlines() if '[INFO]' not in line]
+    assert words == []
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
+@pytest.mark.parametrize('moment', MOMENTS)
+@pytest.mark.parametrize('name', PROGRAMS)
+def test_a_signal_at_any_moment_ends_a_program(graph, name, moment):
+    index = MOMENTS.index(moment) + PROGRAMS.index(name)
+    numbers = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGTERM)][index % 3]
+    process = start(graph, name)
+    pause(graph, moment)
+    for number in numbers:
+        if process.exit_code is None:
+            os.kill(process.pid, number)
+        pause(graph, 0.03 * (index % 2))
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_hail_of_signals_does_no_more_than_one(graph, seed):
+    process = start(graph, PROGRAMS[seed])
+    pause(graph, 0.4 * seed)
+    while process.exit_code is None:
+        os.kill(process.pid, signal.SIGINT if seed else signal.SIGTERM)
+        pause(graph, 0.005)
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.03, 0.06, 0.1, 0.15, 1.0])
+def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
+    process = graph.run([sys.executable, '-c', SHUTDOWN.format(delay=delay)])
+    if delay < 1.0:  # it may come before there is a context, and then does nothing
+        graph.spin_until(lambda: process.exit_code is not None, 3.0)
+        if process.exit_code is None:
+            process.stop()
+    assert_clean(process)
+
+
+def test_a_program_says_that_it_is_ready_once(graph):
+    parameters = Path(__file__).resolve().parents[2] / 'config' / 'arm_2dof.yaml'
+    process = start(graph, 'plant_node', '--ros-args', '--params-file', str(parameters))
+    graph.expect(lambda: '[flat_plant]: ready' in process.stderr, 'a word')
+    pause(graph, 0.3)
+    assert process.stop() == 0
+    assert len(process.stderr.splitlines()) == 1
+
+
+BROKEN = {
+    'missing': (None, 'no such file'),
+    'no YAML': ('a: [1, 2\n b', 'params file'),
+    'no block': ('flat_plant:\n  publish_rate: 3.0\n', 'ros__parameters'),
+    'mixed list': ('/**:\n  ros__parameters:\n    joints: [a, 1]\n', 'same type'),
+}
+"""Parameter files and what is said of them."""
+
+
+@pytest.mark.parametrize('name', BROKEN)
+def test_a_parameter_file_that_cannot_be_read_ends_a_program_with_one_line(graph, tmp_path, name):
+    content, text = BROKEN[name]
+    file = tmp_path / 'parameters.yaml'
+    if content is not None:
+        file.write_text(content)
+    process = graph.run(
+        [sys.executable, '-c', CODE.format('demo'), '--ros-args', '--params-file', str(file)]
+    )
+    assert process.wait() == 1
+    (line,) = process.stderr.splitlines()
+    assert line.startswith('cannot start: ')
+    assert text in line
+    assert '.c:' not in line
