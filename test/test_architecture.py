@@ -27,7 +27,8 @@ MAY_IMPORT = {
     # the plant
     'interpolation': '',
     'effort_profile': 'interpolation errors',
-    'simulation': 'effort_profile arm errors',
+    'drives': 'effort_profile arm errors',
+    'simulation': 'drives effort_profile arm errors',
     'rollout': 'simulation effort_profile arm errors',
     'sensing': 'simulation errors',
     'simulation_settings': 'sensing simulation arm errors',
@@ -61,12 +62,13 @@ MAY_IMPORT = {
     'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'timeline': 'planning plan_samples',
-    'stopping': 'planning extremal solutions errors',
+    'timeline': 'limits planning plan_samples',
+    'stopping': 'limits planning extremal solutions errors',
     'extrema': 'planning plan_samples solutions',
     'limits': 'extrema planning errors',
     'duration': 'limits extrema planning errors',
-    'session': 'stopping timeline duration limits planning plan_samples solutions goal '
+    'timing': 'duration limits extrema planning goal errors',
+    'session': 'stopping timeline timing limits planning plan_samples solutions goal '
     'motion_record cost flatness arm errors',
     'request': 'insensitivity solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',

@@ -79,6 +79,7 @@ from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings
 from flat_planner_ros.core.timeline import Motion, Track
+from flat_planner_ros.core.timing import OnViolation
 from flat_planner_ros.core.tradeoff import (
     advice,
     baselines,
@@ -140,6 +141,7 @@ __all__ = [
     'NoFeasibleDuration',
     'Nominal',
     'NotFlat',
+    'OnViolation',
     'OscillationFit',
     'Outcome',
     'OutOfReach',

@@ -36,6 +36,9 @@ AIM = 1.01
 FIRST_STRIDE = 1.1
 """Least ratio of a duration to the one tried before, if that was too short [-]."""
 
+DIGITS = 9
+"""Significant digits of the durations tried: as many as are reported."""
+
 POWERS = {Quantity.POSITION: 2.0, Quantity.VELOCITY: 1.0, Quantity.EFFORT: 2.0}
 """How the use of a limit falls with the duration of a fixed shape, to leading order."""
 
@@ -47,24 +50,24 @@ class NoFeasibleDuration(FlatPlannerError):
     Attributes
     ----------
     use
-        The limit that is exceeded even by the least exceeding motion; None if no law could be
-        computed at all.
+        The limit that is exceeded even by the least exceeding motion.
     duration
         Of that motion [s].
     shortest, longest
         The durations considered [s].
-    at_rest
-        Whether it is exceeded at rest already, by the static load.
+    at_end
+        Whether it is an effort beyond its limit at the start or the end already: a static load, or
+        that of the motion from which this one starts.
 
     """
 
     def __init__(
         self,
-        use: LimitUse | None,
+        use: LimitUse,
         duration: float,
         shortest: float,
         longest: float,
-        at_rest: bool = False,
+        at_end: bool = False,
     ) -> None:
         """Keep the numbers, so that a caller can name the joint."""
         super().__init__(f'no duration from {shortest:g} to {longest:g} s obeys the limits')
@@ -72,7 +75,7 @@ class NoFeasibleDuration(FlatPlannerError):
         self.duration = duration
         self.shortest = shortest
         self.longest = longest
-        self.at_rest = at_rest
+        self.at_end = at_end
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,6 +137,8 @@ def shortest_plan(
         The range is empty or not finite.
     NoFeasibleDuration
         No duration on a grid of ratio `SCAN_STEP` over the whole range obeys the limits.
+    FlatPlannerError
+        As `plan_of` raises it, if there is no plan of any duration on that grid.
 
     """
     if not (0.0 < shortest <= longest and isfinite(longest)):
@@ -155,6 +160,7 @@ class _Search:
         self._plan_of, self._limits = plan_of, limits
         self._shortest, self._longest = shortest, longest
         self._trials: dict[float, _Trial] = {}
+        self._failure: FlatPlannerError | None = None
 
     def run(self) -> Plan:
         """Return the shortest plan found."""
@@ -174,16 +180,19 @@ class _Search:
         return min((t for t in self._trials.values() if t.obeys), key=lambda t: t.duration)
 
     def _try(self, duration: float) -> _Trial:
-        """Return the trial of a duration."""
+        """Return the trial of a duration, rounded so that its usual text is exactly it."""
+        rounded = float(f'{duration:.{DIGITS}g}')
+        duration = min(max(rounded, self._shortest), self._longest)
         known = self._trials.get(duration)
         if known is not None:
             return known
         try:
             plan = self._plan_of(duration)
-        except (OutOfReach, UncertifiedPlan):
+        except (UncertifiedPlan, OutOfReach) as error:
+            self._failure = error
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
-            self._refuse_static_load(plan)
+            self._refuse_ends(plan)
             uses = self._limits.uses(plan)
             worst = max(uses, key=lambda use: use.ratio, default=None)
             stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
@@ -250,18 +259,20 @@ class _Search:
             duration /= SCAN_STEP
         self._try(low)
 
-    def _refuse_static_load(self, plan: Plan) -> None:
-        """Refuse a motion that starts or ends with too large an effort, once."""
+    def _refuse_ends(self, plan: Plan) -> None:
+        """Refuse a motion that starts or ends with too large an effort; looked at once."""
         if self._trials or Quantity.EFFORT not in self._limits.quantities:
             return
-        use = self._limits.at_rest(plan)
+        use = self._limits.at_ends(plan)
         if use is not None:
-            duration = plan.request.duration
-            raise NoFeasibleDuration(use, duration, self._shortest, self._longest, True)
+            raise NoFeasibleDuration(use, plan.duration, self._shortest, self._longest, True)
 
     def _refuse_if_none(self) -> None:
         """Refuse if no trial obeys."""
-        trials = self._trials.values()
-        if not any(trial.obeys for trial in trials):
-            least = min(trials, key=lambda trial: trial.ratio)
+        least = min(self._trials.values(), key=lambda trial: trial.ratio)
+        if least.obeys:
+            return
+        if least.worst is not None:
             raise NoFeasibleDuration(least.worst, least.duration, self._shortest, self._longest)
+        if self._failure is not None:
+            raise self._failure

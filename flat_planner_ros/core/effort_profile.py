@@ -63,7 +63,7 @@ class EffortProfile:
     times
         Times of the points from the start, increasing, shape (m,) [s].
     efforts
-        Efforts of the actuated joints, shape (m, n-1) [N m]; the last ones are held.
+        Efforts of the actuated joints, shape (m, n-1) [N m].
     positions, velocities
         Where the arm should be, shape (m, n-1) [rad], [rad/s]; both or only positions or none;
         velocities are zero at the end.

@@ -33,6 +33,8 @@ class Reason(Enum):
     PASSIVE_JOINT_NOT_ZERO = 'PASSIVE_JOINT_NOT_ZERO'
     EFFORT_NOT_ALLOWED = 'EFFORT_NOT_ALLOWED'
     POSITION_LIMIT = 'POSITION_LIMIT'
+    VELOCITY_LIMIT = 'VELOCITY_LIMIT'
+    EFFORT_LIMIT = 'EFFORT_LIMIT'
     DURATION_OUT_OF_RANGE = 'DURATION_OUT_OF_RANGE'
     START_STATE_UNKNOWN = 'START_STATE_UNKNOWN'
     START_STATE_STALE = 'START_STATE_STALE'
@@ -58,6 +60,8 @@ class RequestRejected(FlatPlannerError):
         What was found and what is allowed, in SI units, where the rule has numbers.
     time
         Where in the motion [s], if it matters.
+    duration_min
+        Shortest duration that would be accepted, where that is the remedy [s].
 
     """
 
@@ -70,6 +74,7 @@ class RequestRejected(FlatPlannerError):
         value: float | None = None,
         limit: float | None = None,
         time: float | None = None,
+        duration_min: float | None = None,
     ) -> None:
         """Keep the numbers apart from the sentence."""
         super().__init__(message)
@@ -78,6 +83,7 @@ class RequestRejected(FlatPlannerError):
         self.value = value
         self.limit = limit
         self.time = time
+        self.duration_min = duration_min
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Limits of joints, and what of a plan goes beyond them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 from flat_planner_ros.core.errors import InvalidRequest
@@ -130,6 +130,26 @@ class JointLimits:
             raise InvalidRequest(f'limits of {len(made.velocity)} joints for an arm of {joints}')
         return made
 
+    def reaching(self, positions: FloatArray, tolerance: float) -> 'JointLimits':
+        """
+        Return these limits, widened so far that an arm just outside may move back inside.
+
+        Parameters
+        ----------
+        positions
+            Where it is, shape (n,) [rad].
+        tolerance
+            How far outside it may be [rad].
+
+        """
+        low, high = self.position_min, self.position_max
+        near_low, near_high = positions >= low - tolerance, positions <= high + tolerance
+        return replace(
+            self,
+            position_min=np.where(near_low, np.minimum(positions, low), low),
+            position_max=np.where(near_high, np.maximum(positions, high), high),
+        )
+
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """Return what is limited at all."""
@@ -169,7 +189,7 @@ class JointLimits:
         """
         return max(self.uses(plan), key=lambda use: use.ratio, default=None)
 
-    def at_rest(self, plan: Plan) -> LimitUse | None:
+    def at_ends(self, plan: Plan) -> LimitUse | None:
         """Return an effort beyond its limit at an end of a plan, which no duration changes."""
         ends = np.array([0.0, plan.request.duration])
         for time, efforts in zip(ends.tolist(), plan.at(ends).efforts, strict=True):

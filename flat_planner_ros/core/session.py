@@ -9,18 +9,23 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
 from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
 from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.stopping import stop_plan
 from flat_planner_ros.core.timeline import Motion, Timeline, Track
+from flat_planner_ros.core.timing import OnViolation, TimedPlan, Timing
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
 Clock = Callable[[], float]
+
+LONGEST_FOUND = 3600.0
+"""Longest duration that is looked for where the settings name none [s]."""
 
 HANDOVER = 0.25
 """Part of the lookahead that is left for a command to reach its executor [-]."""
@@ -56,9 +61,13 @@ class SessionSettings:
     period
         Spacing of a motion's samples [s].
     default_duration
-        Duration of goals without times [s]; 0 where there is none.
+        Duration of goals without times [s]; 0 for the shortest within the limits.
     min_duration, max_duration
         Range of durations that are accepted [s].
+    limits
+        What the joints may do; None where nothing is limited.
+    on_violation
+        What becomes of durations that are too short for them.
     start_source
         Where motions start.
     start_position
@@ -86,6 +95,8 @@ class SessionSettings:
     default_duration: float = 0.0
     min_duration: float = 0.0
     max_duration: float = inf
+    limits: JointLimits | None = None
+    on_violation: OnViolation = OnViolation.REJECT
     start_source: StartSource = StartSource.AUTO
     start_position: tuple[float, ...] = ()
     position_tolerance: float = 0.01
@@ -108,6 +119,10 @@ class SessionSettings:
             raise InvalidRequest(
                 f'duration.max = {self.max_duration:g} s is below duration.min = '
                 f'{self.min_duration:g} s'
+            )
+        if self.limits is not None and len(self.limits.velocity) != self.arm.n:
+            raise InvalidRequest(
+                f'limits of {len(self.limits.velocity)} joints for an arm of {self.arm.n} joints'
             )
         if self.start_source is StartSource.PARAMETER:
             if len(self.start_position) != self.arm.n:
@@ -237,19 +252,15 @@ class PlannerSession:
         target = rest_target(goal, settings.joints)
         duration = self._checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
-        request = MotionRequest(
-            start=origin.pose,
-            final=np.array(target.positions),
-            duration=duration,
-            start_jets=origin.jets,
-        )
-        planned = self._planned(request, settings.options, origin)
+        timed = self._planned(origin, np.array(target.positions), duration)
         motion = Motion(
             plan_id=self._count + 1,
-            plan=planned,
-            samples=planned.sample(settings.period),
+            plan=timed.plan,
+            samples=timed.plan.sample(settings.period),
             start=origin.time,
             planned_at=now,
+            duration_min=timed.duration_min,
+            exceeded=timed.exceeded,
         )
         motion = self._launched(motion, origin, goal.stamp, clock)
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
@@ -279,7 +290,15 @@ class PlannerSession:
             raise RequestRejected(
                 Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
             )
-        planned = stop_plan(running.plan, origin.pose, origin.jets, running.end - origin.time)
+        limits = self._timing(origin.pose).limits
+        remaining = running.end - origin.time
+        planned = stop_plan(running.plan, origin.pose, origin.jets, remaining, limits)
+        if planned is None:
+            raise RequestRejected(
+                Reason.BUSY,
+                f'no stop within the limits ends sooner than the motion itself, in '
+                f'{running.end - now:.3f} s; it goes on',
+            )
         motion = Motion(
             plan_id=running.plan_id,
             plan=planned,
@@ -317,16 +336,19 @@ class PlannerSession:
         motion = self._timeline.at(now) or self._motion
         return None if motion is None else motion.reference(now)
 
-    def _checked_duration(self, prescribed: float | None) -> float:
-        """Return the duration of a goal, within its range."""
+    def _checked_duration(self, prescribed: float | None) -> float | None:
+        """Return the duration of a goal, within its range; None for an automatic one."""
         settings = self.settings
         duration = settings.default_duration if prescribed is None else prescribed
         if duration == 0.0:
-            raise RequestRejected(
-                Reason.DURATION_OUT_OF_RANGE,
-                'the goal prescribes no duration, and automatic duration is not available in this '
-                'version: set time_from_start in the goal or the parameter duration.default',
-            )
+            if settings.limits is None or not settings.limits.bound_duration:
+                raise RequestRejected(
+                    Reason.DURATION_OUT_OF_RANGE,
+                    'the goal prescribes no duration, and no limit of a velocity or an effort '
+                    'makes one the shortest: set time_from_start in the goal, or one of the '
+                    'parameters duration.default, limits.velocity and limits.effort',
+                )
+            return None
         if not settings.min_duration <= duration <= settings.max_duration:
             below = duration < settings.min_duration
             limit = settings.min_duration if below else settings.max_duration
@@ -339,15 +361,25 @@ class PlannerSession:
             )
         return duration
 
-    def _planned(self, request: MotionRequest, options: PlanningOptions, origin: Origin) -> Plan:
-        """Return a plan that is good to the promised accuracy."""
-        arm = self.settings.arm
+    def _planned(self, origin: Origin, final: FloatArray, duration: float | None) -> TimedPlan:
+        """Return a plan within the limits that is good to the promised accuracy."""
+        arm, options = self.settings.arm, self.settings.options
         if origin.jets is not None and origin.before is not None:
             # What the arm is planned to do then is said in terms of the model it was planned with.
             arm = origin.before.plan.task.arm
             options = replace(options, flat_model=origin.before.plan.options.flat_model)
-        try:
+
+        def plan_of(duration: float) -> Plan:
+            request = MotionRequest(
+                start=origin.pose, final=final, duration=duration, start_jets=origin.jets
+            )
             return plan(request, arm, options)
+
+        timing = self._timing(origin.pose)
+        timing.check_pose('the start', origin.pose)
+        timing.check_pose('the final', final)
+        try:
+            return timing.timed(plan_of, duration)
         except OutOfReach as error:
             raise RequestRejected(
                 Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
@@ -360,6 +392,19 @@ class PlannerSession:
                 value=error.residual,
                 limit=error.tolerance,
             ) from error
+
+    def _timing(self, start: FloatArray) -> Timing:
+        """Return the rules for the duration of a motion from a pose."""
+        settings = self.settings
+        limits = settings.limits or JointLimits.of(settings.arm.n)
+        return Timing(
+            joints=settings.joints,
+            limits=limits.reaching(start, settings.position_tolerance),
+            on_violation=settings.on_violation,
+            # A motion shorter than the spacing of its samples would be none.
+            shortest=max(settings.min_duration, settings.period),
+            longest=min(settings.max_duration, LONGEST_FOUND),
+        )
 
     def _launched(
         self, motion: Motion, origin: Origin, stamp: float | None, clock: Clock | None

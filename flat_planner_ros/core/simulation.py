@@ -8,6 +8,7 @@ from math import floor, inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.drives import Drives
 from flat_planner_ros.core.effort_profile import (
     check_bound,
     EffortProfile,
@@ -61,6 +62,7 @@ class SimulatedArm:
     Time lies on a grid: the start plus a whole number of steps, so that it never drifts. An arm
     that runs away, beyond MAX_SPEED, is stopped where it is until it is reset. An arm that gravity
     would move has brakes: it stands while there is no command, and until its first one starts.
+    After the last point of a command its motors carry its weight where it is, and nothing else.
 
     Parameters
     ----------
@@ -72,11 +74,8 @@ class SimulatedArm:
         Time at the start [s].
     step
         Integration step [s].
-    saturation
-        Largest effort of each motor, shape (n-1,) [N m]; unlimited by default.
-    feedback_p, feedback_d
-        Gains on position and velocity errors of the actuated joints, shape (n-1,) [N m/rad],
-        [N m s/rad]; zeros by default. They act while a command is there.
+    saturation, feedback_p, feedback_d
+        As in Drives.
 
     Raises
     ------
@@ -101,29 +100,24 @@ class SimulatedArm:
             raise InvalidModel(f'step must be finite and above 0 s, got {step}')
         if not np.isfinite(time):
             raise InvalidModel(f'time must be finite, got {time} s')
-        self._arm = arm
+        self._drives = Drives(
+            arm, saturation=saturation, feedback_p=feedback_p, feedback_d=feedback_d
+        )
         self._origin, self._step, self._count = float(time), float(step), 0
-        self._saturation = self._motor_option('saturation', saturation, inf, 'N m')
-        self._feedback_p = self._motor_option('feedback_p', feedback_p, 0.0, 'N m/rad')
-        self._feedback_d = self._motor_option('feedback_d', feedback_d, 0.0, 'N m s/rad')
-        self._is_limited = bool(np.isfinite(self._saturation).any())
-        self._has_feedback = bool(self._feedback_p.any() or self._feedback_d.any())
-        self._missing = np.full(arm.n - 1, np.nan)
         self._clipped_steps, self._is_clipped = 0, False
         self._profile: EffortProfile | None = None
-        self._nothing: Array = np.zeros(arm.n - 1)
         self.reset(np.zeros(arm.n) if position is None else position)
 
     @property
     def arm(self) -> PlanarArm:
         """Return the arm; another with as many joints may take its place between steps."""
-        return self._arm
+        return self._drives.arm
 
     @arm.setter
     def arm(self, arm: PlanarArm) -> None:
-        if arm.n != self._arm.n:
-            raise InvalidModel(f'the arm must keep {self._arm.n} joints, got {arm.n}')
-        self._arm = arm
+        if arm.n != self.arm.n:
+            raise InvalidModel(f'the arm must keep {self.arm.n} joints, got {arm.n}')
+        self._drives.arm = arm
 
     @property
     def step(self) -> float:
@@ -148,9 +142,9 @@ class SimulatedArm:
     @property
     def applied_effort(self) -> Array:
         """Return what acts now: motors after feedback and limit, then the spring (n,) [N m]."""
-        asked = self._asked(self._reference(self.time), self._position, self._velocity)
-        passive = self._arm.passive_effort(self._position[-1], self._velocity[-1])
-        return np.append(self._clip(asked), passive)
+        q, dq, drives = self._position, self._velocity, self._drives
+        given = drives.limited(drives.asked(self._reference(self.time), q, dq))
+        return np.append(given, self.arm.passive_effort(q[-1], dq[-1]))
 
     @property
     def state(self) -> ArmState:
@@ -187,21 +181,29 @@ class SimulatedArm:
 
         """
         self._refuse_if_stopped()
-        motors = self._arm.n - 1
+        motors = self.arm.n - 1
         if profile.motors != motors:
             raise InvalidCommand(f'the arm has {motors} motors, the command {profile.motors}')
-        if profile.efforts[-1].any() and not self._arm.has_weight:
-            # Nobody could know when to let go, and a ramp to zero would be another motion.
-            raise InvalidCommand(f'the last effort must be 0 N m, got {profile.efforts[-1]}')
         if profile.end <= self.time:
             raise InvalidCommand(
                 f'the command ended at {profile.end:.6f} s, before the present {self.time:.6f} s'
             )
-        if self._has_feedback and profile.positions is None:
+        drives, present = self._drives, self._reference(now)
+        if drives.has_feedback and profile.positions is None:
             raise InvalidCommand('feedback needs a command with positions')
-        self._profile = profile.taken_over(now, self._reference(now).effort)
+        if profile.efforts[-1].any() and not self.arm.has_weight:
+            # Nobody could know when to let go, and a ramp to zero would be another motion.
+            raise InvalidCommand(
+                f'the last effort must be 0 N m, got {profile.efforts[-1]}: the arm has no weight '
+                'that it could hold'
+            )
+        # What holds an arm up before the start is where it is, not what a model says of it.
+        is_carried = self.arm.has_weight and present.effort is drives.idle.effort
+        self._idle_until = profile.start + float(profile.times[0]) if is_carried else -inf
         if self._is_braked:
             self._braked_until = profile.start
+        self._profile = profile.taken_over(now, drives.feed_forward(present, self._position))
+        self._held, self._held_until = drives.idle, inf
 
     def hold(self, effort: npt.ArrayLike, until: float = inf) -> None:
         """
@@ -223,33 +225,33 @@ class SimulatedArm:
         """
         self._refuse_if_stopped()
         held = locked('effort', effort, 'N m')
-        if held.shape != (self._arm.n - 1,):
-            raise InvalidCommand(f'effort must have {self._arm.n - 1} entries, got {held.shape}')
+        if held.shape != (self.arm.n - 1,):
+            raise InvalidCommand(f'effort must have {self.arm.n - 1} entries, got {held.shape}')
         check_bound('effort', held, MAX_EFFORT, 'N m')
-        self._profile, self._held, self._held_until = None, held, until
-        self._braked_until = -inf
+        self._profile, self._braked_until = None, -inf
+        self._held, self._held_until = self._drives.idle._replace(effort=held), until
 
     def release(self) -> None:
         """Apply nothing until the next command; an arm with weight stands by its brakes."""
-        self._profile, self._held, self._held_until = None, self._nothing, inf
-        self._braked_until = -inf
-        if self._arm.has_weight:
-            self._braked_until, self._velocity = inf, np.zeros(self._arm.n)
+        self._profile, self._held, self._held_until = None, self._drives.idle, inf
+        self._braked_until = self._idle_until = -inf
+        if self.arm.has_weight:
+            self._braked_until, self._velocity = inf, np.zeros(self.arm.n)
 
     def take_expired(self) -> bool:
         """Return whether a held effort other than zero has ended, and forget that it has."""
         if self.time < self._held_until - GRID_TOLERANCE * self._step:
             return False
-        was_applied = bool(self._held.any())
+        was_applied = bool(self._held.effort.any())
         self.release()
         return was_applied
 
     def reset(self, position: npt.ArrayLike) -> None:
         """Rest at joint angles (n,) [rad] without a command; time goes on."""
         angles = np.array(position, dtype=float)
-        if angles.shape != (self._arm.n,) or not np.isfinite(angles).all():
-            raise InvalidModel(f'position must be {self._arm.n} finite rad, got {angles}')
-        self._position, self._velocity = angles, np.zeros(self._arm.n)
+        if angles.shape != (self.arm.n,) or not np.isfinite(angles).all():
+            raise InvalidModel(f'position must be {self.arm.n} finite rad, got {angles}')
+        self._position, self._velocity = angles, np.zeros(self.arm.n)
         self._fault = ''
         self.release()
 
@@ -306,7 +308,7 @@ class SimulatedArm:
             f's, beyond {MAX_SPEED:g} rad/s: the efforts, or the friction and gains for steps of '
             f'{self._step:g} s, are too large'
         )
-        self._velocity = np.zeros(self._arm.n)
+        self._velocity = np.zeros(self.arm.n)
         self.release()
 
     def _refuse_if_stopped(self) -> None:
@@ -316,43 +318,18 @@ class SimulatedArm:
 
     def _acceleration(self, reference: JointReference, q: Array, dq: Array) -> Array:
         """Return joint accelerations, shape (n,) [rad/s^2]."""
-        effort = self._asked(reference, q, dq)
-        if self._is_limited:
-            asked, effort = effort, self._clip(effort)
-            self._is_clipped = self._is_clipped or bool((asked != effort).any())
-        return self._arm.forward_dynamics(q, dq, effort)
+        asked = self._drives.asked(reference, q, dq)
+        given = self._drives.limited(asked)
+        self._is_clipped = self._is_clipped or given is not asked
+        return self.arm.forward_dynamics(q, dq, given)
 
     def _reference(self, t: float) -> JointReference:
         """Return what is commanded at an absolute time [s]."""
-        if self._profile is None:
-            held = self._held if t < self._held_until else self._nothing
-            return JointReference(held, self._missing, self._missing)
-        if self._has_feedback:
-            return self._profile.reference(t)
-        return JointReference(self._profile.effort(t), self._missing, self._missing)
-
-    def _asked(self, reference: JointReference, q: Array, dq: Array) -> Array:
-        """Return feed-forward and feedback, shape (n-1,) [N m]."""
-        if not self._has_feedback or self._profile is None:
-            return reference.effort
-        return (
-            reference.effort
-            + self._feedback_p * (reference.position - q[:-1])
-            + self._feedback_d * (reference.velocity - dq[:-1])
-        )
-
-    def _clip(self, effort: Array) -> Array:
-        """Return what the motors can give, shape (n-1,) [N m]."""
-        return np.minimum(np.maximum(effort, -self._saturation), self._saturation)
-
-    def _motor_option(
-        self, name: str, value: npt.ArrayLike | None, default: float, unit: str
-    ) -> Array:
-        """Return one non-negative number per motor."""
-        motors = self._arm.n - 1
-        array = np.full(motors, default) if value is None else np.array(value, dtype=float)
-        if array.shape != (motors,):
-            raise InvalidModel(f'{name} must have {motors} entries, got shape {array.shape}')
-        if not (array >= 0.0).all():
-            raise InvalidModel(f'{name} must be at least 0 {unit}, got {array}')
-        return array
+        profile, idle = self._profile, self._drives.idle
+        if profile is None:
+            return self._held if t < self._held_until else idle
+        is_idle = t < self._idle_until or t > profile.end
+        if self._drives.has_feedback:
+            reference = profile.reference(t)
+            return reference._replace(effort=idle.effort) if is_idle else reference
+        return idle if is_idle else idle._replace(effort=profile.effort(t))

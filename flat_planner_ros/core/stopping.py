@@ -8,6 +8,7 @@ so that two laws tell where that is.
 
 from flat_planner_ros.core.errors import UncertifiedPlan
 from flat_planner_ros.core.extremal import momentum_of
+from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
 from flat_planner_ros.core.solutions import CONDITIONS
 import numpy as np
@@ -31,12 +32,19 @@ PROBE = 1.0
 """Distance between the two final values that are tried [rad]."""
 
 
-def stop_plan(running: Plan, pose: FloatArray, jets: FloatArray | None, remaining: float) -> Plan:
+def stop_plan(
+    running: Plan,
+    pose: FloatArray,
+    jets: FloatArray | None,
+    remaining: float,
+    limits: JointLimits | None = None,
+) -> Plan | None:
     """
     Return the shortest plan to rest that demands little more than the motion that it ends.
 
     Its peaks of effort and velocity stay below twice the motion's: with the same effort, a motion
-    that is optimal cannot be stopped much before its end.
+    that is optimal cannot be stopped much before its end. None if no stop keeps within the limits:
+    then the motion itself, which does, is the better one.
 
     Parameters
     ----------
@@ -49,6 +57,8 @@ def stop_plan(running: Plan, pose: FloatArray, jets: FloatArray | None, remainin
         the arm has not begun to move.
     remaining
         Time that the motion would still take [s], the longest stop.
+    limits
+        Of the joints, if there are any.
 
     """
     arm, options = running.task.arm, running.options
@@ -57,7 +67,8 @@ def stop_plan(running: Plan, pose: FloatArray, jets: FloatArray | None, remainin
         return plan(request, arm, options)
     effort = DEMAND * running.peak_effort
     velocity = DEMAND * running.peak_velocity
-    best = _stop(running, options, pose, jets, remaining)
+    whole = _stop(running, options, pose, jets, remaining)
+    best = None if _exceeds(whole, limits) else whole
     shortest, longest = SHORTEST * remaining, remaining
     for _ in range(HALVINGS):
         middle = (shortest * longest) ** 0.5
@@ -66,11 +77,18 @@ def stop_plan(running: Plan, pose: FloatArray, jets: FloatArray | None, remainin
         except UncertifiedPlan:
             shortest = middle
             continue
-        if (tried.peak_effort <= effort).all() and (tried.peak_velocity <= velocity).all():
-            best, longest = tried, middle
-        else:
+        demanding = (tried.peak_effort > effort).any() or (tried.peak_velocity > velocity).any()
+        if demanding or _exceeds(tried, limits):
             shortest = middle
+        else:
+            best, longest = tried, middle
     return best
+
+
+def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
+    """Tell whether a stop goes beyond a limit."""
+    use = None if limits is None else limits.worst(tried)
+    return use is not None and use.exceeded
 
 
 def _stop(

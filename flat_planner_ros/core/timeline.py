@@ -10,6 +10,7 @@ seam (docs/derivation.md, section S).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from flat_planner_ros.core.limits import LimitUse
 from flat_planner_ros.core.plan_samples import PlanSamples
 from flat_planner_ros.core.planning import Plan
 import numpy as np
@@ -42,6 +43,10 @@ class Motion:
         Absolute time at which another motion takes over [s]; None if none does.
     stops
         Whether it brings a motion of the same number to rest early.
+    duration_min
+        Shortest duration within the limits, where it was looked for [s].
+    exceeded
+        What the prescribed duration would have exceeded, if the motion was stretched.
 
     """
 
@@ -52,6 +57,8 @@ class Motion:
     planned_at: float
     cut: float | None = None
     stops: bool = False
+    duration_min: float | None = None
+    exceeded: LimitUse | None = None
 
     @property
     def end(self) -> float:

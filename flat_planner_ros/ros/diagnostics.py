@@ -101,6 +101,7 @@ def accepted_status(
     )
     values: dict[str, float | int | str | None] = {
         **_of_motion(motion, 'ACCEPTED'),
+        'duration_min': motion.duration_min,
         'planning_time': planning_time,
         'boundary_residual': plan.boundary_residual,
         'optimality_residual': plan.optimality_residual,
@@ -109,7 +110,13 @@ def accepted_status(
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
         values.update(_per_joint(quantity, joints, getattr(plan, quantity).tolist()))
-    return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, {**values, **_echo(goal)})
+    level = DiagnosticStatus.OK
+    if motion.exceeded is not None:
+        use = motion.exceeded
+        level, name = DiagnosticStatus.WARN, joints[use.joint]
+        message += f'; stretched: as prescribed, {use.sentence(name)}'
+        values.update(joint=name, value=use.value, limit=use.limit, time=use.time)
+    return status_msg(STATUS_NAME, level, message, {**values, **_echo(goal)})
 
 
 def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStatus:
@@ -122,6 +129,7 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
         'value': _precise(error.value),
         'limit': _precise(error.limit),
         'time': error.time,
+        'duration_min': error.duration_min,
         **({} if goal is None else _echo(goal)),
     }
     return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)

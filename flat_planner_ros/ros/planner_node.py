@@ -144,7 +144,7 @@ class PlannerNode(Node):
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Plan the last goal again."""
         status = self._answer(lambda: self._session.last_goal)
-        response.success = status.level == DiagnosticStatus.OK
+        response.success = status.level != DiagnosticStatus.ERROR
         response.message = status.message
         return response
 
@@ -232,9 +232,11 @@ class PlannerNode(Node):
     def _publish_status(self, status: DiagnosticStatus) -> None:
         """Publish and log a verdict."""
         self._status.publish(diagnostics.array_of(status, self._now()))
-        # Two calls: a logger refuses another severity from the same line.
+        # A call for each: a logger refuses another severity from the same line.
         if status.level == DiagnosticStatus.OK:
             self.get_logger().info(status.message)
+        elif status.level == DiagnosticStatus.WARN:
+            self.get_logger().warning(status.message)
         else:
             self.get_logger().error(status.message)
 

@@ -1,12 +1,15 @@
 """Parameters of the planner node."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isqrt
+from math import isqrt
 
 from flat_planner_ros.core import (
     flat_map,
     FlatModel,
+    JointLimits,
     MAX_WEIGHT,
+    OnViolation,
     PlanningOptions,
     QuadraticCost,
     rehearse,
@@ -53,6 +56,9 @@ class PlannerSettings:
     stream_effort: bool
 
 
+LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
+"""What may be limited."""
+
 ROWS = [
     *model_rows(read_only=False),
     Row(
@@ -95,7 +101,7 @@ ROWS = [
     Row(
         name='duration.default',
         default=0.0,
-        description='duration of goals without times [s]; 0 = automatic, not yet available',
+        description='duration of goals without times [s]; 0 = the shortest within limits',
         lower=0.0,
     ),
     Row(name='duration.min', default=0.05, description='shortest duration [s]', lower=0.0),
@@ -104,25 +110,31 @@ ROWS = [
         name='limits.position_min',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='lower position limits per joint [rad]; not yet available',
+        description='lower position limits per joint [rad]; .inf = none',
     ),
     Row(
         name='limits.position_max',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='upper position limits per joint [rad]; not yet available',
+        description='upper position limits per joint [rad]; .inf = none',
     ),
     Row(
         name='limits.velocity',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='velocity limits per joint [rad/s]; not yet available',
+        description='velocity limits per joint [rad/s]; .inf = none',
     ),
     Row(
         name='limits.effort',
         default=Parameter.Type.DOUBLE_ARRAY,
         infinite=True,
-        description='effort limits per joint [N m]; not yet available',
+        description='effort limits per joint [N m]; .inf = none',
+    ),
+    Row(
+        name='limits.on_violation',
+        default=OnViolation.REJECT.value,
+        description='what becomes of a motion that is too fast for the limits',
+        choices=tuple(choice.value for choice in OnViolation),
     ),
     Row(
         name='sampling.period',
@@ -236,7 +248,6 @@ def build(values: Values) -> PlannerSettings:
         They contradict each other, or ask for what this version does not have.
 
     """
-    _refuse_unavailable(values)
     joints, arm = arm_of(values)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
@@ -267,6 +278,8 @@ def build(values: Values) -> PlannerSettings:
         default_duration=values['duration.default'],
         min_duration=values['duration.min'],
         max_duration=values['duration.max'],
+        limits=_limits(values, joints),
+        on_violation=OnViolation(values['limits.on_violation']),
         start_source=StartSource(values['start.source']),
         start_position=tuple(values.get('start.position', ())),
         position_tolerance=values['start.position_tolerance'],
@@ -289,6 +302,18 @@ def build(values: Values) -> PlannerSettings:
     )
 
 
+def _limits(values: Values, joints: Sequence[str]) -> JointLimits:
+    """Return the limits of all joints."""
+    given = {name: values[f'limits.{name}'] for name in LIMITS if f'limits.{name}' in values}
+    for name, numbers in given.items():
+        if len(numbers) != len(joints):
+            raise InvalidParameter(
+                f'limits.{name} needs one number for each of {", ".join(joints)}, .inf where '
+                f'there is no limit; got {len(numbers)}'
+            )
+    return JointLimits.of(len(joints), **given)
+
+
 def _custom_cost(values: Values) -> np.ndarray | None:
     """Return Q as a matrix."""
     numbers = values.get('weights.Q')
@@ -298,12 +323,3 @@ def _custom_cost(values: Values) -> np.ndarray | None:
     matrix = np.reshape(numbers, (side, side) if side**2 == len(numbers) else -1)
     # Refused now if it is inadmissible, even while another strategy is in use.
     return QuadraticCost(matrix=matrix).matrix
-
-
-def _refuse_unavailable(values: Values) -> None:
-    """Refuse what a later version will do, rather than ignore it."""
-    for name, value in values.items():
-        if name.startswith('limits.') and not all(abs(number) == inf for number in value):
-            raise InvalidParameter(
-                f'{name} is not available in this version, leave it out or set it to .inf'
-            )

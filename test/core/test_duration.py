@@ -238,7 +238,7 @@ def test_a_load_on_the_way_that_no_duration_lifts_is_refused_with_its_number():
     assert (use.joint, use.quantity, abs(use.limit)) == (0, Quantity.EFFORT, 5.2)
     assert 5.3 <= abs(use.value) < 5.35
     assert 1.2 < refusal.value.duration < 2.2
-    assert not refusal.value.at_rest
+    assert not refusal.value.at_end
 
 
 def test_a_load_at_rest_is_refused_at_once():
@@ -251,7 +251,7 @@ def test_a_load_at_rest_is_refused_at_once():
 
     with pytest.raises(NoFeasibleDuration) as refusal:
         shortest_plan(motion, JointLimits.of(3, effort=[2.0, inf, inf]), **RANGE)
-    assert refusal.value.at_rest
+    assert refusal.value.at_end
     assert len(tried) == 1
     held = arm.gravity_effort(np.array([0.0, 1.0, 0.0]))[0]
     assert refusal.value.use.value == pytest.approx(held, rel=1e-9)
@@ -268,11 +268,10 @@ def test_a_law_without_certificate_is_no_answer(paper_arm):
 
     found = shortest_plan(certified_above, JointLimits.of(2, effort=[1e3, inf]), **RANGE)
     assert 0.7 <= found.duration <= 0.7 * (1.0 + DURATION_TOLERANCE)
-    with pytest.raises(NoFeasibleDuration) as refusal:
+    with pytest.raises(UncertifiedPlan):
         shortest_plan(
             lambda t: certified_above(t, inf), JointLimits.of(2, effort=[1.0, inf]), **RANGE
         )
-    assert refusal.value.use is None
 
 
 @pytest.mark.parametrize('span', [(0.0, 1.0), (2.0, 1.0), (1.0, inf)])

@@ -47,6 +47,23 @@ def simple(**options):
     return EffortProfile(**{**data, **options})
 
 
+def vertical_arm(n, **options):
+    """Return a flat arm in the vertical plane; its first n-2 links have a weight."""
+    count = n - 2
+    return PlanarArm.reduced(
+        inertia_star=(6.4e-4, 3.3e-5),
+        stiffness=3e-3,
+        damping=2e-5,
+        link_length=[0.3] * count,
+        link_com=[0.12] * count,
+        link_mass=[0.8] * count,
+        link_inertia=[4e-3] * count,
+        tip_mass=0.4,
+        gravity=9.81,
+        **options,
+    )
+
+
 def kicked(arm, velocity, **options):
     """Return an arm that moves already, after a short kick by its motors."""
     simulated = SimulatedArm(arm, **options)
@@ -265,6 +282,13 @@ def test_one_point_is_a_profile():
         ({'times': [0.5, 1.0]}, 'efforts'),
         ({'times': [], 'efforts': np.zeros((0, 1))}, 'm >= 1'),
         ({'efforts': [[2.0], [float('inf')], [0.0]]}, 'efforts must be finite'),
+        ({'efforts': [[2.0], [1.1e6], [0.0]]}, r'effort of 1\.1e\+06 N m is beyond'),
+        ({'positions': [[0.0], [-1e300], [0.0]]}, r'position of 1e\+300 rad'),
+        (
+            {'positions': np.zeros((3, 1)), 'velocities': [[0.0], [1e5], [0.0]]},
+            r'velocity of 1e\+05 rad/s',
+        ),
+        ({'positions': np.zeros((3, 1)), 'velocities': np.ones((3, 1))}, 'last velocity'),
         ({'efforts': [2.0, 4.0, 0.0]}, 'efforts'),
         ({'efforts': np.zeros((3, 0))}, 'efforts'),
         ({'positions': [[0.0], [0.0]]}, 'positions'),
@@ -277,6 +301,15 @@ def test_one_point_is_a_profile():
 def test_profiles_that_cannot_be_played_are_refused(change, message):
     with pytest.raises(InvalidCommand, match=message):
         simple(**change)
+
+
+@pytest.mark.parametrize('last', [1e-300, -2.0])
+def test_nothing_is_held_after_the_last_point(last):
+    simulated = SimulatedArm(PAPER)
+    with pytest.raises(InvalidCommand, match='last effort must be 0 N m'):
+        simulated.command(simple(start=0.0, efforts=[[2e-3], [4e-3], [last]]), 0.0)
+    simulated.advance(1.0)
+    assert not simulated.position.any()
 
 
 @pytest.mark.parametrize('n', [2, 4])
@@ -306,7 +339,7 @@ def test_brakes_hold_an_arm_that_gravity_would_move_until_its_command_starts(n):
     np.testing.assert_array_equal(simulated.position, position)
 
 
-def test_an_arm_with_weight_is_held_by_its_last_effort():
+def test_an_arm_with_weight_is_held_after_its_last_effort():
     arm = PlanarArm.from_links(
         link_length=[0.3, 0.2, 0.2],
         link_com=[0.1, 0.0, 0.0],
@@ -327,10 +360,34 @@ def test_an_arm_with_weight_is_held_by_its_last_effort():
     np.testing.assert_allclose(simulated.position, position, atol=1e-12)
 
 
-def test_without_weight_the_last_effort_must_be_zero():
-    simulated = SimulatedArm(PAPER)
-    with pytest.raises(InvalidCommand, match='last effort must be 0'):
-        simulated.command(simple(efforts=[[2.0], [4.0], [1e-12]]), 0.0)
+@pytest.mark.parametrize('n', [3, 4, 7])
+def test_motors_without_a_command_carry_the_weight(n):
+    arm = vertical_arm(n)
+    position = np.append(np.linspace(0.4, 1.1, n - 1), 0.0)
+    simulated = SimulatedArm(arm, position=position)
+    weight = arm.gravity_effort(position)[:-1]
+    assert np.abs(weight).max() > 1.0
+
+    def rests():
+        moved = np.abs(simulated.position - position).max()
+        return moved < 1e-9 and simulated.applied_effort[:-1] == pytest.approx(weight, abs=1e-6)
+
+    simulated.advance(2.0)
+    assert rests()
+    # Until the first point as well, whatever effort a wrong model puts there, and after the last.
+    times, efforts = [0.0, 1e-3], np.array([1.3 * weight, 1.3 * weight])
+    profile = EffortProfile(start=5.0, times=times, efforts=efforts)
+    simulated.command(profile, simulated.time)
+    simulated.advance(4.999)
+    assert rests()
+    simulated.advance(5.001)
+    assert simulated.applied_effort[:-1] == pytest.approx(1.3 * weight, rel=1e-3)
+    simulated.advance(5.1)
+    now = simulated.position
+    assert simulated.applied_effort[:-1] == pytest.approx(arm.gravity_effort(now)[:-1])
+    simulated.hold(np.zeros(n - 1), until=6.0)  # An effort of zero is a command: the arm falls.
+    simulated.advance(5.5)
+    assert np.abs(simulated.position - now).max() > 0.1
 
 
 def test_command_takes_over_from_the_effort_of_the_one_before():

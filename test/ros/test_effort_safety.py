@@ -13,7 +13,7 @@ GOAL = '/flat_planner/goal'
 PLAN = '/flat_planner/plan'
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-DURATION = 6.0
+DURATION = 9.0
 """Of a motion [s]: long enough to restart a process in the middle of it."""
 
 
@@ -62,7 +62,9 @@ class Watched:
     def wait_until(self, time: float):
         """Wait for a joint state stamped then or later."""
         self.graph.expect(
-            lambda: self.states and stamp(self.states[-1]) >= time, f'joint states until {time}'
+            lambda: self.states and stamp(self.states[-1]) >= time,
+            f'joint states until {time}',
+            timeout=3 * DURATION,
         )
 
     def efforts(self) -> np.ndarray:
@@ -73,7 +75,7 @@ class Watched:
 def test_a_plant_that_was_killed_in_a_motion_does_not_take_it_up_again(graph):
     watched = Watched(graph)
     start = stamp(watched.move(1.0))
-    watched.wait_until(start + 0.2 * DURATION)
+    watched.wait_until(start + 0.15 * DURATION)
     assert watched.efforts().any()
     watched.plant.kill()
     watched.start()
@@ -92,7 +94,7 @@ def test_a_command_sent_again_after_a_restart_is_refused_as_elsewhere(graph):
     commands = graph.collect(JointTrajectory, COMMAND)
     watched.move(1.0)
     graph.expect(lambda: commands, 'a command')
-    watched.wait_until(stamp(commands[0]) + 0.2 * DURATION)
+    watched.wait_until(stamp(commands[0]) + 0.15 * DURATION)
     watched.plant.kill()
     watched.start()
     graph.publish(COMMAND, commands[0], readers=3)

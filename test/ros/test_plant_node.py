@@ -447,7 +447,7 @@ def test_a_stream_of_efforts_moves_it_as_samples_that_are_held(graph):
     for number, effort in enumerate(efforts.tolist()):
         starts.append(plant.time())
         graph.publish(EFFORTS, Float64MultiArray(data=[effort]))
-        graph.expect(lambda e=effort: plant.node._arm._simulated._held == e, 'the effort')
+        graph.expect(lambda e=effort: plant.node._arm._simulated._held.effort == e, 'the effort')
         plant.drive(100.0 + period * (number + 1))
     plant.drive(101.5)
     times, shown = plant.times, plant.table('effort')[:, 0]
