@@ -21,13 +21,14 @@ MADE := $(VENV)/made-for-$(if $(PYTHON),$(subst /,_,$(PYTHON))-)$(or $(ROS),whee
 DEPENDENCIES := $(VENV)/dependencies-installed
 PACKAGE := $(VENV)/package-installed
 PEERS := $(VENV)/peers-installed
+SITE := $(VENV)/site-installed
 SOURCES := $(shell find flat_planner_ros config launch resource -type f -not -name '*.pyc' | sort)
 
 export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_PREFIX_PATH))
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test fuzz bench lint install clean FORCE
+.PHONY: help demo test fuzz bench docs lint install clean FORCE
 .DELETE_ON_ERROR:
 
 help:  ## show this list
@@ -49,6 +50,11 @@ fuzz: install  ## random motions against multiple precision, FUZZ_CASES=100000 b
 
 bench: install $(PEERS)  ## speed beside other libraries, and of the nodes; benchmarks/results.md
 	$(BIN)/python benchmarks/run.py $(ARGS)
+
+docs: install $(SITE)  ## the documentation as a site, build/docs/index.html
+	$(BIN)/python docs/parameter_tables.py
+	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs $(ARGS)
+	@echo 'open build/docs/index.html'
 
 lint: install  ## ruff and mypy only
 	$(BIN)/python -m ruff check
@@ -84,6 +90,12 @@ $(PEERS): setup.py $(DEPENDENCIES)
 	$(BIN)/python -m pip install --quiet --progress-bar off \
 	  "numpy==$$($(BIN)/python -c 'import numpy; print(numpy.__version__)')" '.[bench]' \
 	  || echo 'some libraries of the comparison could not be installed' >&2
+	@rm -rf build/lib build/bdist.* *.egg-info
+	@touch $@
+
+$(SITE): setup.py $(DEPENDENCIES)
+	$(BIN)/python -m pip install --quiet --progress-bar off \
+	  "numpy==$$($(BIN)/python -c 'import numpy; print(numpy.__version__)')" '.[docs]'
 	@rm -rf build/lib build/bdist.* *.egg-info
 	@touch $@
 

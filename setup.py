@@ -47,6 +47,12 @@ setup(
         'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],
         # The live view in a real browser, Chromium; skipped without.
         'browser': ['playwright>=1.49,<2'],
+        'docs': [
+            'furo>=2024.1',
+            'myst-parser>=3,<6',
+            'numpydoc>=1.6,<2',
+            'sphinx>=7.2,<9',
+        ],
         'test': [
             'aiohttp>=3.9,<4',
             'hypothesis>=6.98,<7',

@@ -1,5 +1,11 @@
-"""The paper's numerical example: its strategies, its scenarios and the numbers that it prints."""
+"""
+The paper's numerical example: its strategies, its scenarios and the numbers that it prints.
 
+`BEYOND` adds what the paper does not have: a plant that is 10 % softer, too, and three methods.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -42,8 +48,58 @@ SCENARIOS = (
     Scenario(3, 'stiffness and damping +10 % in the plant', 1.0, 1.1, 1.1),
 )
 
+SOFTER = Scenario(4, 'stiffness and damping -10 % in the plant', 1.0, 0.9, 0.9)
+"""The other side of scenario 3, and the worse one."""
+
 STRATEGIES = ('polynomial', 'min_control_effort', 'min_potential_energy')
 """In the order of the paper's table, named as the planner's parameter `strategy`."""
+
+
+class Method(NamedTuple):
+    """
+    One way to plan the motion.
+
+    Attributes
+    ----------
+    name
+        As the table shows it.
+    parameters
+        Of the planner, fixed ones.
+    learns
+        Whether the row is the second of two motions, after the estimate from the first has been
+        adopted.
+
+    """
+
+    name: str
+    parameters: Mapping[str, str]
+    learns: bool = False
+
+
+def _method(name: str, strategy: str, flat_model: str, learns: bool = False) -> Method:
+    """Return a method."""
+    parameters = MappingProxyType({'strategy': strategy, 'flat_model': flat_model})
+    return Method(name, parameters, learns)
+
+
+METHODS = tuple(_method(strategy, strategy, 'approximate') for strategy in STRATEGIES)
+"""Those of the paper."""
+
+EXACT = _method('exact', 'min_control_effort', 'exact')
+INSENSITIVE = _method('insensitive', 'insensitive', 'exact')
+SELF_TUNED = _method('self-tuned, 2nd move', 'min_control_effort', 'exact', learns=True)
+
+CASES = tuple((scenario, method) for scenario in SCENARIOS for method in METHODS)
+"""The rows of the paper's table."""
+
+BEYOND = (
+    *CASES[:6],
+    *((SCENARIOS[1], method) for method in (EXACT, INSENSITIVE)),
+    *CASES[6:],
+    *((SCENARIOS[2], method) for method in (EXACT, INSENSITIVE, SELF_TUNED)),
+    *((SOFTER, method) for method in (*METHODS, EXACT, INSENSITIVE, SELF_TUNED)),
+)
+"""The same with what the paper does not have."""
 
 PRINTED = {
     (1, 'polynomial'): (0.0074, 0.0),
@@ -86,7 +142,7 @@ class Result(NamedTuple):
     Attributes
     ----------
     scenario, strategy
-        Which run.
+        Which run; the name of its method.
     rms_effort
         Time-RMS of the planned effort of joint 1 [N m].
     amplitude
@@ -103,6 +159,6 @@ class Result(NamedTuple):
     recording: Recording
 
     @property
-    def printed(self) -> tuple[float, float]:
-        """Return the paper's RMS effort [N m] and amplitude [rad]."""
-        return PRINTED[self.scenario.number, self.strategy]
+    def printed(self) -> tuple[float, float] | None:
+        """Return the paper's RMS effort [N m] and amplitude [rad], None where it has none."""
+        return PRINTED.get((self.scenario.number, self.strategy))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from flat_planner_ros.paper_example import DURATION, Recording, Result, SCENARIOS
+from flat_planner_ros.paper_example import DURATION, Recording, Result
 import numpy as np
 
 SHOWN_AFTER = 1.0
@@ -19,8 +19,11 @@ STYLES = {
     'polynomial': ('C0', '-'),
     'min_control_effort': ('C3', '--'),
     'min_potential_energy': ('C2', ':'),
+    'exact': ('C1', '-'),
+    'insensitive': ('C4', '-'),
+    'self-tuned, 2nd move': ('C5', '--'),
 }
-"""Colour and line of each strategy, as in the paper."""
+"""Colour and line of each method, those of the paper as there."""
 
 ROWS = ('$q_1$ [rad]', '$q_2$ [rad]', r'$\tau_1$ [N m]')
 
@@ -32,7 +35,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
     Parameters
     ----------
     results
-        Any of the nine runs.
+        Any of the runs, at least one.
     path
         File to write; its suffix chooses the format.
 
@@ -47,10 +50,16 @@ def draw(results: Sequence[Result], path: Path) -> None:
     mpl.use('Agg')  # A terminal without a display is enough.
     from matplotlib import pyplot as plt
 
+    scenarios = list(dict.fromkeys(result.scenario for result in results))
     figure, axes = plt.subplots(
-        len(ROWS), len(SCENARIOS), figsize=(13.0, 7.5), sharex=True, sharey='row', squeeze=False
+        len(ROWS),
+        len(scenarios),
+        figsize=(4.0 * len(scenarios) + 1.0, 7.5),
+        sharex=True,
+        sharey='row',
+        squeeze=False,
     )
-    for column, scenario in enumerate(SCENARIOS):
+    for column, scenario in enumerate(scenarios):
         axes[0, column].set_title(f'Scenario {scenario.number}: {scenario.title}', fontsize=10)
         for result in results:
             if result.scenario != scenario:
@@ -68,8 +77,13 @@ def draw(results: Sequence[Result], path: Path) -> None:
         axes[-1, column].set_xlabel('time [s]')
         axes[-1, column].set_xlim(0.0, DURATION + SHOWN_AFTER)
         axes[-1, column].xaxis.set_major_locator(plt.MultipleLocator(TICKS))
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='lower center', ncols=len(STYLES), frameon=False)
+    lines = [
+        line for axis in axes[0] for line in zip(*axis.get_legend_handles_labels(), strict=True)
+    ]
+    handles = {label: handle for handle, label in lines}
+    figure.legend(
+        handles.values(), handles.keys(), loc='lower center', ncols=len(STYLES), frameon=False
+    )
     figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
     figure.savefig(path, dpi=120)
     plt.close(figure)

@@ -68,8 +68,8 @@ MAY_IMPORT = {
     'limits': 'extrema planning errors',
     'duration': 'limits extrema planning errors',
     'timing': 'duration limits extrema planning goal errors',
-    'session': 'stopping timeline timing limits planning plan_samples solutions goal '
-    'motion_record cost flatness arm errors',
+    'session': 'via_times request stopping timeline timing limits planning plan_samples solutions '
+    'goal motion_record cost flatness arm errors',
     'request': 'insensitivity solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',
@@ -80,8 +80,8 @@ MAY_IMPORT = {
     'piecewise_law': 'motion_law',
     'via_points': 'coupling segment_basis piecewise_law moving_start unit_motion extremal '
     'solutions motion_law cost errors',
-    'via_times': 'via_points cost errors',
-    'planning': 'via_points shaped_course moving_start solutions course task request plan_samples '
+    'via_times': 'via_points task request solutions cost arm errors',
+    'planning': 'via_times via_points shaped_course moving_start course task request plan_samples '
     'cost flatness arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""

@@ -87,6 +87,7 @@ from flat_planner_ros.core.tradeoff import (
     tradeoff_points,
     TradeoffPoint,
 )
+from flat_planner_ros.core.via_times import with_via_times
 from flat_planner_ros.core.vibration import VibrationMonitor
 from flat_planner_ros.core.vibration_report import Level, MonitorSettings, VibrationReport
 
@@ -186,4 +187,5 @@ __all__ = [
     'ViaPoint',
     'VibrationMonitor',
     'VibrationReport',
+    'with_via_times',
 ]

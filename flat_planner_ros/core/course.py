@@ -124,8 +124,15 @@ class RestToRest:
 
     def on_even_grid(self, intervals: int) -> Samples:
         """Return derivatives and torque at intervals + 1 even times."""
-        table: FloatArray = np.array(self.distances)[:, None, None] * self.task.grid(intervals)
-        for values, start, final in zip(table[:, 0], self.start, self.final, strict=True):
+        task, places = self.task, zip(self.distances, self.start, self.final, strict=True)
+        table = np.empty((len(self.distances), len(task.rates) + 1, intervals + 1))
+        unit = task.grid(intervals) if len(table) > 1 else None
+        for part, (distance, start, final) in zip(table, places, strict=True):
+            if unit is None:
+                task.fill_grid(part, distance)
+            else:
+                np.multiply(unit, distance, out=part)
+            values = part[0]
             values += 0.5 * (start + final)
             values[0], values[-1] = start, final
         return Samples(table[:, :-1], table[0, -1])

@@ -37,7 +37,7 @@ class InvalidRequest(FlatPlannerError):
     """The motion asked for has no meaning (not finite, no duration)."""
 
 
-class OutOfReach(InvalidRequest):
+class OutOfReach(FlatPlannerError):
     """
     No motion meets a bound that was asked for.
 

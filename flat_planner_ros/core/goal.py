@@ -128,6 +128,23 @@ class Goal:
     stamp: float | None = None
 
 
+class Waypoint(NamedTuple):
+    """
+    Where a motion passes.
+
+    Attributes
+    ----------
+    positions
+        Angles in kinematic order, the passive joint last and zero [rad].
+    time
+        From the start of the motion [s]; None when the planner is to choose.
+
+    """
+
+    positions: tuple[float, ...]
+    time: float | None
+
+
 class RestTarget(NamedTuple):
     """
     What an admissible goal asks for.
@@ -138,11 +155,19 @@ class RestTarget(NamedTuple):
         Final angles in kinematic order, the passive joint last and zero [rad].
     duration
         Prescribed time of the motion [s]; None when the planner is to choose.
+    via
+        Points to pass on the way, in the order of time.
 
     """
 
     positions: tuple[float, ...]
     duration: float | None
+    via: tuple[Waypoint, ...] = ()
+
+    @property
+    def chooses_times(self) -> bool:
+        """Whether there are via points whose times the planner is to choose."""
+        return bool(self.via) and self.duration is None
 
 
 def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
@@ -166,41 +191,14 @@ def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
     for index, point in enumerate(goal.points):
         _check_point(goal, index, point)
     duration = _checked_duration(goal)
-    final = goal.points[-1]
-    for quantity, values in (
-        ('velocity', final.velocities),
-        ('acceleration', final.accelerations),
-    ):
-        for name, value in zip(goal.joint_names, values, strict=False):
-            if value != 0.0:
-                raise RequestRejected(
-                    Reason.NONZERO_END_STATE,
-                    f'the motion must end at rest, but the final {quantity} of {name} is '
-                    f'{value:g}; leave it out or set it to 0',
-                    joint=name,
-                    value=value,
-                    limit=0.0,
-                )
-    angles = dict(zip(goal.joint_names, final.positions, strict=True))
-    passive = joints[-1]
-    if angles.setdefault(passive, 0.0) != 0.0:
-        raise RequestRejected(
-            Reason.PASSIVE_JOINT_NOT_ZERO,
-            f'the spring of {passive} holds no angle at rest: its final position must be 0 rad, '
-            f'got {angles[passive]:g} rad',
-            joint=passive,
-            value=angles[passive],
-            limit=0.0,
-        )
-    if len(goal.points) > 1:
-        raise RequestRejected(
-            Reason.INVALID_GOAL,
-            f'via points are not available in this version: send one point, got '
-            f'{len(goal.points)}',
-            value=float(len(goal.points)),
-            limit=1.0,
-        )
-    return RestTarget(tuple(angles[name] for name in joints), duration)
+    for point in goal.points[:-1]:
+        _check_only_passed(goal, point)
+    _check_rest(goal, goal.points[-1])
+    *via, final = (_angles(goal, point, joints) for point in goal.points)
+    if duration is None:
+        return RestTarget(final, None, tuple(Waypoint(angles, None) for angles in via))
+    times = (point.time for point in goal.points)
+    return RestTarget(final, duration, tuple(map(Waypoint, via, times)))
 
 
 def check_point_count(count: int) -> None:
@@ -284,6 +282,60 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
                 limit=MAX_ANGLE,
                 time=point.time,
             )
+
+
+def _check_rest(goal: Goal, final: GoalPoint) -> None:
+    """Refuse an end in motion."""
+    for quantity, values in _derivatives(final):
+        for name, value in zip(goal.joint_names, values, strict=False):
+            if value != 0.0:
+                raise RequestRejected(
+                    Reason.NONZERO_END_STATE,
+                    f'the motion must end at rest, but the final {quantity} of {name} is '
+                    f'{value:g}; leave it out or set it to 0',
+                    joint=name,
+                    value=value,
+                    limit=0.0,
+                )
+
+
+def _check_only_passed(goal: Goal, point: GoalPoint) -> None:
+    """Refuse velocities and accelerations of via points, which the planner chooses."""
+    for quantity, values in _derivatives(point):
+        for name, value in zip(goal.joint_names, values, strict=False):
+            if value != 0.0:
+                raise RequestRejected(
+                    Reason.INVALID_GOAL,
+                    f'via points prescribe positions only, but there the {quantity} of {name} is '
+                    f'{value:g}; leave it out, the planner chooses it',
+                    joint=name,
+                    value=value,
+                    limit=0.0,
+                    time=point.time,
+                )
+
+
+def _derivatives(point: GoalPoint) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """Return what a point says of the motion, by name."""
+    return ('velocity', point.velocities), ('acceleration', point.accelerations)
+
+
+def _angles(goal: Goal, point: GoalPoint, joints: Sequence[str]) -> tuple[float, ...]:
+    """Return a point's angles in kinematic order; refuse a loaded spring."""
+    angles = dict(zip(goal.joint_names, point.positions, strict=True))
+    passive = joints[-1]
+    if angles.setdefault(passive, 0.0) != 0.0:
+        place = 'final position' if point is goal.points[-1] else 'position in a via point'
+        raise RequestRejected(
+            Reason.PASSIVE_JOINT_NOT_ZERO,
+            f'the spring of {passive} holds no angle that could be asked for: its {place} must '
+            f'be 0 rad, got {angles[passive]:g} rad',
+            joint=passive,
+            value=angles[passive],
+            limit=0.0,
+            time=point.time,
+        )
+    return tuple(angles[name] for name in joints)
 
 
 def _checked_duration(goal: Goal) -> float | None:

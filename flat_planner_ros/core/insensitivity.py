@@ -7,8 +7,8 @@ from math import isfinite
 from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.robustness import UncertaintyBox
 
-DEFAULT_WEIGHT = 500.0
-"""Weight where nothing is chosen: a residual of 1/500 of the way costs as much as all effort."""
+DEFAULT_WEIGHT = 700.0
+"""Weight where nothing is chosen: a residual of 1/700 of the way costs as much as all effort."""
 
 MAX_INSENSITIVITY = 1e5
 """Largest weight: beyond, the effort is that of the smallest residual anyway."""

@@ -34,7 +34,7 @@ class LimitUse:
     time
         From the start of the motion, when the value is attained [s].
     ratio
-        How often the allowance is used up [-]: |value| / |limit|; for positions, the excursion
+        How often the allowance is used up [-]: magnitude over limit; for positions, the excursion
         beyond both ends of the motion relative to the one that is allowed.
 
     """

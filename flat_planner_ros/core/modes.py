@@ -152,11 +152,12 @@ class ModeSum:
             for start in range(0, half, CHUNK):
                 stop = min(start + CHUNK, half)
                 blocks = coarse[start // size : -(-stop // size)]
-                part = np.zeros((orders, stop - start))
                 if count:
                     scaled = np.multiply(amplitudes, blocks, order='C').view(float)
                     product = scaled.reshape(orders * len(blocks), 4 * count) @ fine
                     part = product.reshape(orders, -1)[:, : stop - start]
+                else:
+                    part = np.zeros((orders, stop - start))
                 if factors.shape[1] > 4 * count:
                     powers = np.empty((factors.shape[1] - 4 * count, stop - start))
                     _fill_powers(powers, x[start:stop])

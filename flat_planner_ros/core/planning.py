@@ -12,11 +12,16 @@ from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.flatness import apply_row, FlatMap, FlatModel
 from flat_planner_ros.core.moving_start import laws_to_rest
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.request import MotionRequest, PlanningOptions, ViaPoint
+from flat_planner_ros.core.request import (
+    MotionRequest,
+    planned_at_rest,
+    PlanningOptions,
+    ViaPoint,
+)
 from flat_planner_ros.core.shaped_course import shaped_course
-from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.task import fractions, Task, task_of
-from flat_planner_ros.core.via_points import optimal_path, Path
+from flat_planner_ros.core.via_points import optimal_path
+from flat_planner_ros.core.via_times import path_of
 import numpy as np
 from numpy.typing import NDArray
 
@@ -239,7 +244,7 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
 
 def _from_rest(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
     """Return a plan whose planned variables are multiples of the unit motion."""
-    start, final = _planned(request.start), _planned(request.final)
+    start, final = planned_at_rest(request.start), planned_at_rest(request.final)
     distances = tuple(
         [0.0 if abs(b - a) < NO_DISTANCE else b - a for a, b in zip(start, final, strict=True)]
     )
@@ -269,7 +274,7 @@ def _from_motion(
     request: MotionRequest, options: PlanningOptions, task: Task, start: FloatArray
 ) -> Plan:
     """Return a plan whose planned variables have given derivatives at the start."""
-    final = np.array(_planned(request.final))
+    final = np.array(planned_at_rest(request.final))
     with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
         found = laws_to_rest(task, start, final)
     _certify('boundary residual', found.boundary_residual, BOUNDARY_TOLERANCE)
@@ -288,17 +293,9 @@ def _from_motion(
 
 def _through_points(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
     """Return a plan whose flat outputs pass given values on the way."""
-    final = np.array(_planned(request.final))
-    start = request.start_jets
-    if start is None:
-        start = np.zeros((len(final), CONDITIONS))
-        start[:, 0] = _planned(request.start)
-    edges = (0.0, *(point.time for point in request.via), task.duration)
-    values = np.column_stack([*(point.values for point in request.via), final])
-    relaxations = np.zeros(len(final))
-    # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
-    relaxations[0] = task.flat_map.relaxation
-    path = Path(edges=np.array(edges), start=start, values=values, relaxations=relaxations)
+    if options.strategy is Strategy.INSENSITIVE:
+        raise InvalidRequest('strategy insensitive has no via points; another strategy has')
+    path = path_of(request, task)
     found = optimal_path(task.cost, path)
     _certify('boundary residual', found.boundary_residual, BOUNDARY_TOLERANCE)
     _certify('optimality residual', found.optimality_residual, OPTIMALITY_TOLERANCE)
@@ -306,7 +303,13 @@ def _through_points(request: MotionRequest, options: PlanningOptions, task: Task
         request=request,
         options=options,
         task=task,
-        course=FreeCourse(task=task, laws=found.laws, start=start, final=final, edges=edges),
+        course=FreeCourse(
+            task=task,
+            laws=found.laws,
+            start=path.start,
+            final=path.values[:, -1],
+            edges=tuple(path.edges.tolist()),
+        ),
         boundary_residual=found.boundary_residual,
         optimality_residual=found.optimality_residual,
     )
@@ -324,12 +327,6 @@ def _check_fit(request: MotionRequest, arm: PlanarArm) -> None:
     for name, angles in ends:
         if angles[-1] != 0.0:
             raise InvalidRequest(f'{name} angle of the elastic joint is {angles[-1]:g} rad, not 0')
-
-
-def _planned(angles: FloatArray) -> tuple[float, ...]:
-    """Return the planned variables of an arm at rest: the last link's angle, q_1 ... q_(n-2)."""
-    joints = angles.tolist()
-    return (float(sum(joints)), *joints[:-2])
 
 
 def _certify(quantity: str, residual: float, tolerance: float) -> None:

@@ -1,6 +1,6 @@
 """What is asked of the planner: a motion that ends at rest, and what it minimises."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 
 from flat_planner_ros.core.cost import Strategy
@@ -78,6 +78,18 @@ class MotionRequest:
         if self.start_jets is not None:
             self._check_start_jets()
 
+    def stretched(self, duration: float) -> 'MotionRequest':
+        """
+        Return the same motion in another time, each via point at the same share of it.
+
+        The start keeps its derivatives: it is a state, not a part of the motion to be stretched.
+        """
+        if duration == self.duration:
+            return self
+        share = duration / self.duration
+        via = tuple(ViaPoint(time=share * point.time, values=point.values) for point in self.via)
+        return replace(self, duration=duration, via=via)
+
     def _check_via(self) -> None:
         """Refuse via points of another arm, or out of order."""
         previous = 0.0
@@ -140,6 +152,25 @@ class PlanningOptions:
             custom = np.array(self.custom, dtype=float)
             custom.setflags(write=False)
             object.__setattr__(self, 'custom', custom)
+
+
+def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:
+    """
+    Return the planned variables, which are the flat outputs, of an arm at rest.
+
+    Parameters
+    ----------
+    angles
+        Of all joints, shape (n,) [rad].
+
+    Returns
+    -------
+    tuple[float, ...]
+        The last link's absolute angle and q_1 ... q_(n-2), n - 1 numbers [rad].
+
+    """
+    joints = angles.tolist()
+    return (float(sum(joints)), *joints[:-2])
 
 
 def _angles(name: str, values: FloatArray) -> FloatArray:

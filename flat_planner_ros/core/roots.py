@@ -11,7 +11,7 @@ from cmath import sqrt
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +72,7 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
         a_0 ... a_6 in normalised time, a_0 = 0 and a_6 = 1, shape (7,) [-].
 
     """
-    zeros = int(np.flatnonzero(coefficients)[0])
+    zeros = next(k for k, a in enumerate(coefficients.tolist()) if a != 0.0)
     reduced = coefficients[zeros:]
     squares = _companion_roots(reduced)
     separate = _separate(reduced.tolist(), squares.tolist(), zeros)
@@ -80,11 +80,14 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
         return separate
     groups = _groups(np.concatenate([np.zeros(zeros, dtype=complex), squares]))
     places = squares.tolist()
-    members = [[places[i - zeros] for i in group if i >= zeros] for group in groups]
+    members = [[places[i - zeros] for i in group.members if i >= zeros] for group in groups]
     central, *others = _factors(reduced[::-1].tolist(), members)
     around_zero = np.zeros(2 * (len(central) + zeros) - 1, dtype=complex)
     around_zero[: 2 * len(central) : 2] = central
-    found = [_cluster(_roots(factor)) for factor in others]
+    found = [
+        _cluster(_roots(factor), group.is_imaginary)
+        for factor, group in zip(others, groups[1:], strict=True)
+    ]
     return [
         Cluster(centre=0j, factor=around_zero),
         *(cluster for cluster in found if cluster is not None),
@@ -98,7 +101,7 @@ def _companion_roots(ascending: NDArray[Number]) -> ComplexArray:
     if degree == 0:
         return np.zeros(0, dtype=complex)
     scale = max(abs(a) ** (1.0 / n) for n, a in enumerate(first, start=1)) or 1.0
-    companion = np.eye(degree, k=-1, dtype=ascending.dtype)
+    companion = _shift(degree).astype(ascending.dtype)
     companion[0] = [-a / scale**n for n, a in enumerate(first, start=1)]
     roots: ComplexArray = np.linalg.eigvals(companion).astype(complex)
     roots *= scale
@@ -146,6 +149,12 @@ def _polished(ascending: list[float], z: complex) -> complex | None:
 
 
 @cache
+def _shift(degree: int) -> FloatArray:
+    """Return the companion matrix of D^degree."""
+    return np.eye(degree, k=-1)
+
+
+@cache
 def _monomial(degree: int) -> ComplexArray:
     """Return D^degree, descending."""
     factor = np.zeros(degree + 1, dtype=complex)
@@ -154,8 +163,15 @@ def _monomial(degree: int) -> ComplexArray:
     return factor
 
 
-def _groups(squares: ComplexArray) -> list[list[int]]:
-    """Return the indices of linked roots, single linkage over all twelve +-beta."""
+class _Group(NamedTuple):
+    """Indices of linked roots, and whether they surround a point of the imaginary axis."""
+
+    members: list[int]
+    is_imaginary: bool
+
+
+def _groups(squares: ComplexArray) -> list[_Group]:
+    """Return linked roots, single linkage over all twelve +-beta, those around zero first."""
     beta = np.sqrt(squares)
     both = np.concatenate([beta, -beta])
     decay = np.abs(both.real)
@@ -167,11 +183,13 @@ def _groups(squares: ComplexArray) -> list[list[int]]:
     count = len(beta)
     # A component that contains beta and -beta surrounds zero, where two of the roots always lie.
     central = [i for i in range(count) if linked[i, i + count] or linked[i, 0]]
-    groups, seen = [central], set(central)
+    groups, seen = [_Group(central, False)], set(central)
     for i in range(count):
         if i not in seen:
             group = [j for j in range(count) if linked[i, j] or linked[i, j + count]]
-            groups.append(group)
+            heights = [beta[j].imag if linked[i, j] else -beta[j].imag for j in group]
+            # Linked to its conjugate beta lies on both sides of the real axis, to -conj(beta) not.
+            groups.append(_Group(group, min(heights) > 0.0 or max(heights) < 0.0))
             seen.update(group)
     return groups
 
@@ -281,18 +299,18 @@ def _is_conjugate_closed(squares: Sequence[complex]) -> bool:
     return upper == lower
 
 
-def _cluster(squares: Sequence[complex]) -> Cluster | None:
+def _cluster(squares: Sequence[complex], is_imaginary: bool) -> Cluster | None:
     """Return the representative of a group away from zero, None for the mirror image of one."""
     if not _is_conjugate_closed(squares):
         if sum(z.imag for z in squares) < 0.0:
             return None
         roots = [sqrt(z) for z in squares]
         centre = sum(roots) / len(roots)
-    elif sum(z.real for z in squares) > 0.0:
-        roots = [sqrt(z) for z in squares]
-        centre = complex(sum(root.real for root in roots) / len(roots))
-    else:
+    elif is_imaginary:
         roots = [1j * sqrt(-z) for z in squares]
         centre = 1j * (sum(root.imag for root in roots) / len(roots))
+    else:
+        roots = [sqrt(z) for z in squares]
+        centre = complex(sum(root.real for root in roots) / len(roots))
     factor = np.array(_monic(root - centre for root in roots))
     return Cluster(centre=centre, factor=factor)

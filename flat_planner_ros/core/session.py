@@ -8,15 +8,17 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
-from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target, RestTarget
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
+from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, ViaPoint
+from flat_planner_ros.core.request import planned_at_rest
 from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.stopping import stop_plan
 from flat_planner_ros.core.timeline import Motion, Timeline, Track
 from flat_planner_ros.core.timing import OnViolation, TimedPlan, Timing
+from flat_planner_ros.core.via_times import with_via_times
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +31,10 @@ LONGEST_FOUND = 3600.0
 
 HANDOVER = 0.25
 """Part of the lookahead that is left for a command to reach its executor [-]."""
+
+
+NOMINAL_DURATION = 1.0
+"""Duration of a request before its own is found [s]."""
 
 
 class StartSource(Enum):
@@ -252,7 +258,7 @@ class PlannerSession:
         target = rest_target(goal, settings.joints)
         duration = self._checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
-        timed = self._planned(origin, np.array(target.positions), duration)
+        timed = self._planned(origin, target, duration)
         motion = Motion(
             plan_id=self._count + 1,
             plan=timed.plan,
@@ -361,7 +367,7 @@ class PlannerSession:
             )
         return duration
 
-    def _planned(self, origin: Origin, final: FloatArray, duration: float | None) -> TimedPlan:
+    def _planned(self, origin: Origin, target: RestTarget, duration: float | None) -> TimedPlan:
         """Return a plan within the limits that is good to the promised accuracy."""
         arm, options = self.settings.arm, self.settings.options
         if origin.jets is not None and origin.before is not None:
@@ -369,17 +375,26 @@ class PlannerSession:
             arm = origin.before.plan.task.arm
             options = replace(options, flat_model=origin.before.plan.options.flat_model)
 
-        def plan_of(duration: float) -> Plan:
-            request = MotionRequest(
-                start=origin.pose, final=final, duration=duration, start_jets=origin.jets
-            )
-            return plan(request, arm, options)
-
         timing = self._timing(origin.pose)
         timing.check_pose('the start', origin.pose)
-        timing.check_pose('the final', final)
+        for index, point in enumerate(target.via):
+            timing.check_pose(f'via point {index}', np.array(point.positions))
+        timing.check_pose('the final', np.array(target.positions))
+
+        def timed(request: MotionRequest) -> TimedPlan:
+            return timing.timed(lambda time: plan(request.stretched(time), arm, options), duration)
+
+        request = _request(target, origin, duration or NOMINAL_DURATION)
         try:
-            return timing.timed(plan_of, duration)
+            if not target.chooses_times:
+                return timed(request)
+            found = timed(with_via_times(request, arm, options))
+            if duration is not None:
+                return found
+            # The best shares of the time depend on the time, if little.
+            return timed(with_via_times(found.plan.request, arm, options))
+        except InvalidRequest as error:
+            raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
         except OutOfReach as error:
             raise RequestRejected(
                 Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
@@ -552,6 +567,25 @@ def _check_time(now: float) -> None:
             Reason.START_STATE_UNKNOWN,
             'there is no time yet: use_sim_time is set, but no /clock has been received',
         )
+
+
+def _request(target: RestTarget, origin: Origin, duration: float) -> MotionRequest:
+    """Return what is asked of a plan; via times that are to be chosen are even for now."""
+    count = len(target.via) + 1
+    via = tuple(
+        ViaPoint(
+            time=duration * index / count if point.time is None else point.time,
+            values=np.array(planned_at_rest(np.array(point.positions))),
+        )
+        for index, point in enumerate(target.via, start=1)
+    )
+    return MotionRequest(
+        start=origin.pose,
+        final=np.array(target.positions),
+        duration=duration,
+        via=via,
+        start_jets=origin.jets,
+    )
 
 
 def _too_late(stamp: float, now: float) -> RequestRejected:

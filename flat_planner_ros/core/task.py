@@ -86,6 +86,14 @@ class Task:
         """Return the derivatives 0 to 6 and the torque at even times, read-only, shape (8, m)."""
         return (_grid if intervals > MAX_KEPT_INTERVALS else _kept_grid)(self, intervals)
 
+    def fill_grid(self, table: FloatArray, distance: float) -> None:
+        """Write the derivatives 0 to 6 and the torque over a distance at even times, (8, m)."""
+        intervals = table.shape[1] - 1
+        if intervals <= MAX_KEPT_INTERVALS:
+            np.multiply(_kept_grid(self, intervals), distance, out=table)
+        else:
+            _fill(self, table, distance)
+
 
 @lru_cache(maxsize=TASKS_KEPT)
 def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
@@ -113,7 +121,8 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
         largest = float((rates * unit.peaks).max())
     # (35) with every derivative in units of the half duration.
     cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
-    reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5)
+    # A law that is no minimum, which its certificate refuses, might have a negative cost.
+    reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5) if cost_value > 0 else 0.0
     return Task(
         arm=arm,
         duration=duration,
@@ -129,19 +138,32 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
 def _grid(task: Task, intervals: int) -> FloatArray:
     """Return the motion over 1 rad at even times."""
     table = np.empty((len(task.rates) + 1, intervals + 1))
-    task.unit.fill_grid(table[:-1], task.rates)
-    row = task.flat_map.effort
-    np.matmul(row, table[: len(row)], out=table[-1])
+    _fill(task, table, 1.0)
     table.setflags(write=False)
     return table
+
+
+def _fill(task: Task, table: FloatArray, distance: float) -> None:
+    """Write the motion over a distance at even times."""
+    task.unit.fill_grid(table[:-1], distance * task.rates)
+    row = task.flat_map.effort
+    np.matmul(row, table[: len(row)], out=table[-1])
 
 
 _kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
 
 
-@lru_cache(maxsize=GRIDS_KEPT)
 def fractions(intervals: int) -> FloatArray:
-    """Return even fractions of the duration, both ends exact."""
-    fractions = np.arange(intervals + 1.0) / intervals
+    """Return even fractions of the duration, both ends exact, read-only, shape (m,)."""
+    return (_fractions if intervals > MAX_KEPT_INTERVALS else _kept_fractions)(intervals)
+
+
+def _fractions(intervals: int) -> FloatArray:
+    """Return even fractions of the duration."""
+    fractions = np.arange(intervals + 1.0)
+    fractions /= intervals
     fractions.setflags(write=False)
     return fractions
+
+
+_kept_fractions = lru_cache(maxsize=GRIDS_KEPT)(_fractions)

@@ -50,6 +50,9 @@ MAX_KEPT_INTERVALS = 10_000
 """Longest grid that is kept; with `GRIDS_KEPT` it bounds the cache to 18 MB."""
 
 
+_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
+
+
 class Mean(NamedTuple):
     """Means and peaks over a motion, of linear combinations of derivatives."""
 
@@ -152,16 +155,13 @@ def unit_motion(key: bytes) -> UnitMotion:
     law = MotionLaw(duration=2.0, modes=unit_modes(coefficients))
     jet = law.terms.at(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
-    ends = zip(*jet[:CONDITIONS, [0, -1]].T.tolist(), peaks.tolist(), strict=False)
     # Relative to the start, as the value's own peak is the distance.
-    halves = (0.5, *(CONDITIONS - 1) * (0.0,))
-    miss = [
-        max(abs(start + half), abs(end - half)) / (peak + half)
-        for half, (start, end, peak) in zip(halves, ends, strict=True)
-    ]
+    miss = np.abs(jet[:CONDITIONS, [0, -1]] - _ENDS).max(axis=1) / (
+        peaks[:CONDITIONS] + _ENDS[:, 1]
+    )
     return UnitMotion(
         law=law,
-        boundary_residual=float(np.array(miss).max()),
+        boundary_residual=float(miss.max()),
         optimality_residual=stationarity_residual(coefficients, jet) + KEY_ROUNDING,
         momentum=float(momentum_of(coefficients, jet[:, -2])),
         peaks=peaks,

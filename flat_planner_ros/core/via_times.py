@@ -6,11 +6,21 @@ of them ((V9) of docs/derivation.md). So the times are refined by a quasi-Newton
 cost that the strategy minimises, the duration kept.
 """
 
+from dataclasses import replace
 from functools import partial
 from math import inf
 
+from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import QuadraticCost
 from flat_planner_ros.core.errors import UncertifiedPlan
+from flat_planner_ros.core.request import (
+    MotionRequest,
+    planned_at_rest,
+    PlanningOptions,
+    ViaPoint,
+)
+from flat_planner_ros.core.solutions import CONDITIONS
+from flat_planner_ros.core.task import Task, task_of
 from flat_planner_ros.core.via_points import optimal_path, Path
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +61,9 @@ def allocate_times(cost: QuadraticCost, path: Path) -> FloatArray:
     Raises
     ------
     UncertifiedPlan
-        A path on the way cannot be computed in double precision.
+        The conditions of a path tried are singular in double precision.
+    ArithmeticError
+        Its numbers leave double precision.
 
     """
     from scipy.optimize import minimize  # here: slow to import, and only for goals without times
@@ -64,17 +76,64 @@ def allocate_times(cost: QuadraticCost, path: Path) -> FloatArray:
         return np.linspace(0.0, duration, count + 1)
     # Between constant speed and equal times: the ends are at rest, the rest is passed at speed.
     guess = np.log(np.maximum(np.sqrt(lengths / lengths.max()), LEAST_SHARE))
+    found = minimize(
+        partial(_log_cost, cost, path),
+        guess - guess.mean(),
+        jac=True,
+        method='BFGS',
+        options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
+    )
+    return _edges(found.x, duration)
+
+
+def path_of(request: MotionRequest, task: Task) -> Path:
+    """Return what the planned variables of a motion go through."""
+    final = np.array(planned_at_rest(request.final))
+    start = request.start_jets
+    if start is None:
+        start = np.zeros((len(final), CONDITIONS))
+        start[:, 0] = planned_at_rest(request.start)
+    relaxations = np.zeros(len(final))
+    # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
+    relaxations[0] = task.flat_map.relaxation
+    return Path(
+        edges=np.array([0.0, *(point.time for point in request.via), request.duration]),
+        start=start,
+        values=np.column_stack([*(point.values for point in request.via), final]),
+        relaxations=relaxations,
+    )
+
+
+def with_via_times(
+    request: MotionRequest, arm: PlanarArm, options: PlanningOptions
+) -> MotionRequest:
+    """
+    Return a request whose via points have the times at which the motion is cheapest.
+
+    Parameters
+    ----------
+    request
+        Points in their order, and the duration, which is kept; the times of the via points do not
+        matter.
+    arm, options
+        As for `plan`.
+
+    Raises
+    ------
+    FlatPlannerError
+        The arm, the weights or the numbers allow no plan.
+
+    """
     try:
-        found = minimize(
-            partial(_log_cost, cost, path),
-            guess - guess.mean(),
-            jac=True,
-            method='BFGS',
-            options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
-        )
+        task = task_of(arm, options, request.duration)
+        edges = allocate_times(task.cost, path_of(request, task))
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, 0.0) from error
-    return _edges(found.x, duration)
+    via = tuple(
+        ViaPoint(time=time, values=point.values)
+        for point, time in zip(request.via, edges[1:-1].tolist(), strict=True)
+    )
+    return replace(request, via=via)
 
 
 def _shares(logarithms: FloatArray) -> FloatArray:

@@ -6,8 +6,14 @@ from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.core import FlatModel
-from flat_planner_ros.paper_example import DURATION, GOAL_ANGLE, Recording, Result, Scenario
+from flat_planner_ros.paper_example import (
+    DURATION,
+    GOAL_ANGLE,
+    Method,
+    Recording,
+    Result,
+    Scenario,
+)
 from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.parameters import EXAMPLE_ARM
 import numpy as np
@@ -107,6 +113,7 @@ class Experimenter(Node):
             for name in OURS
         }
         self._reset = self.create_client(Trigger, interfaces.of(plant, interfaces.RESET))
+        self._adopt = self.create_client(Trigger, interfaces.of(planner, interfaces.ADOPT))
 
     def wait_for_nodes(self) -> None:
         """Wait until all three nodes answer and hear each other."""
@@ -129,6 +136,7 @@ class Experimenter(Node):
             lambda: (
                 all(client.service_is_ready() for client in self._setters.values())
                 and self._reset.service_is_ready()
+                and self._adopt.service_is_ready()
                 and self._goals.get_subscription_count() > 0
                 and bool(self._states)
                 and are_listening()
@@ -136,9 +144,11 @@ class Experimenter(Node):
             'the three nodes do not find each other',
         )
 
-    def run(self, scenario: Scenario, strategy: str) -> Result:
+    def run(self, scenario: Scenario, method: Method) -> Result:
         """
-        Carry out one motion, again if the machine was too busy to play it from the start.
+        Carry out one motion, or the second of two by a method that learns.
+
+        A motion that the machine was too busy to play from the start is carried out again.
 
         Raises
         ------
@@ -146,27 +156,42 @@ class Experimenter(Node):
             A node died, refused something or did not answer.
 
         """
-        self._configure(scenario, strategy)
+        self._configure(scenario, method)
         if company := [name for name in OURS if self.get_node_names().count(name) > 1]:
             raise ExperimentFailed(_complaint(company))
+        if method.learns:
+            self._played(scenario, method)
+            self._learn()
+        return self._played(scenario, method)
+
+    def _played(self, scenario: Scenario, method: Method) -> Result:
+        """Return a motion that was played as planned."""
         for _ in range(ATTEMPTS):
             try:
-                return self._attempt(scenario, strategy)
+                return self._attempt(scenario, method)
             except NotPlayed as reason:
                 self.get_logger().warning(f'{reason}; once more')
                 self._lead *= 2.0
         raise ExperimentFailed(f'not played as planned {ATTEMPTS} times: the machine is too busy')
 
-    def _configure(self, scenario: Scenario, strategy: str) -> None:
-        """Set the paper's planner, what it knows of the damping, and the plant's mismatch."""
+    def _learn(self) -> None:
+        """Have the planner adopt the monitor's estimate as soon as it has heard of it."""
+        deadline = monotonic() + REPORT_PATIENCE
+        while not (answer := self._call(self._adopt, Trigger.Request())).success:
+            if monotonic() > deadline:
+                raise ExperimentFailed(f'no estimate was adopted: {answer.message}')
+            self._spin_until(lambda: False, PAUSE)
+
+    def _configure(self, scenario: Scenario, method: Method) -> None:
+        """Set the planner, what it knows of the arm, and the plant's mismatch."""
         planner, plant, monitor = OURS
         damping = scenario.damping_factor * EXAMPLE_ARM['model.damping']
         self._set(
             planner,
             {
-                'strategy': strategy,
+                **method.parameters,
+                'model.stiffness': EXAMPLE_ARM['model.stiffness'],
                 'model.damping': damping,
-                'flat_model': FlatModel.APPROXIMATE.value,
             },
         )
         self._set(monitor, {'model.damping': damping})
@@ -186,7 +211,7 @@ class Experimenter(Node):
         if not answer.successful:
             raise ExperimentFailed(f'{node} refused its parameters: {answer.reason}')
 
-    def _attempt(self, scenario: Scenario, strategy: str) -> Result:
+    def _attempt(self, scenario: Scenario, method: Method) -> Result:
         """Carry out one motion from rest."""
         self._call(self._reset, Trigger.Request())
         for heard in (self._states, self._verdicts, self._plans, self._reports):
@@ -207,7 +232,7 @@ class Experimenter(Node):
         if not moving.any() or error.max() > PLAYED_TOLERANCE * np.abs(planned).max():
             raise NotPlayed('the command reached the plant after its start')
         rms = float(np.sqrt(trapezoid(planned**2, times) / DURATION))
-        return Result(scenario, strategy, rms, float(values['amplitude']), recording)
+        return Result(scenario, method.name, rms, float(values['amplitude']), recording)
 
     def _accepted_start(self) -> float:
         """Send the goal until the planner has seen the reset; return the motion's start [s]."""

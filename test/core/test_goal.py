@@ -1,6 +1,7 @@
 """Every rule for goals: what obeys it passes, what breaks it is refused with the numbers."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import inf, nan, pi
 
 from flat_planner_ros.core.goal import (
@@ -34,7 +35,7 @@ def rejection(goal: Goal) -> RequestRejected:
 
 
 def test_the_passive_joint_may_be_left_out():
-    assert rest_target(GOAL, JOINTS) == ((pi, 0.0), 1.0)
+    assert rest_target(GOAL, JOINTS) == ((pi, 0.0), 1.0, ())
 
 
 def test_joints_may_come_in_any_order():
@@ -42,7 +43,7 @@ def test_joints_may_come_in_any_order():
         joint_names=('elastic', 'shoulder'),
         points=(GoalPoint(time=2.0, positions=(0.0, -1.0)),),
     )
-    assert rest_target(goal, JOINTS) == ((-1.0, 0.0), 2.0)
+    assert rest_target(goal, JOINTS) == ((-1.0, 0.0), 2.0, ())
 
 
 def test_time_zero_leaves_the_duration_open():
@@ -52,6 +53,24 @@ def test_time_zero_leaves_the_duration_open():
 def test_zero_end_velocities_and_accelerations_are_allowed():
     goal = with_point(velocities=(0.0,), accelerations=(-0.0,))
     assert rest_target(goal, JOINTS).positions == (pi, 0.0)
+
+
+def test_via_points_are_read_in_kinematic_order():
+    points = (
+        GoalPoint(time=0.5, positions=(0.0, 0.7), velocities=(0.0, 0.0)),
+        GoalPoint(time=2.0, positions=(0.0, -1.0)),
+    )
+    goal = Goal(joint_names=('elastic', 'shoulder'), points=points)
+    assert rest_target(goal, JOINTS).via == (((0.7, 0.0), 0.5),)
+    without = replace(goal, points=tuple(replace(point, time=0.0) for point in points))
+    assert rest_target(without, JOINTS) == ((-1.0, 0.0), None, (((0.7, 0.0), None),))
+
+
+def test_the_largest_goal_is_admitted():
+    points = tuple(GoalPoint(time=0.1 * i, positions=(i,)) for i in range(1, MAX_POINTS + 1))
+    target = rest_target(replace(GOAL, points=points), JOINTS)
+    assert len(target.via) == MAX_POINTS - 1
+    assert target.via[-1].time < target.duration == points[-1].time
 
 
 BROKEN = {
@@ -146,12 +165,32 @@ BROKEN = {
         0.1,
         0.0,
     ),
-    'via point': (
-        replace(GOAL, points=(FINAL, replace(FINAL, time=2.0))),
+    'velocity in a via point': (
+        replace(GOAL, points=(replace(FINAL, velocities=(0.5,)), replace(FINAL, time=2.0))),
         Reason.INVALID_GOAL,
-        None,
-        2.0,
-        1.0,
+        'shoulder',
+        0.5,
+        0.0,
+    ),
+    'acceleration in a via point': (
+        replace(GOAL, points=(replace(FINAL, accelerations=(-2.0,)), replace(FINAL, time=2.0))),
+        Reason.INVALID_GOAL,
+        'shoulder',
+        -2.0,
+        0.0,
+    ),
+    'loaded spring in a via point': (
+        Goal(
+            joint_names=JOINTS,
+            points=(
+                GoalPoint(time=1.0, positions=(1.0, 0.2)),
+                GoalPoint(time=2.0, positions=(1.0, 0.0)),
+            ),
+        ),
+        Reason.PASSIVE_JOINT_NOT_ZERO,
+        'elastic',
+        0.2,
+        0.0,
     ),
     'too many points': (
         replace(GOAL, points=(FINAL,) * (MAX_POINTS + 1)),
@@ -198,3 +237,8 @@ def test_a_goal_is_either_admissible_or_refused(joint_names, goal_points):
     assert target.positions[-1] == 0.0
     assert abs(target.positions[0]) <= MAX_ANGLE
     assert target.duration is None or target.duration > 0.0
+    times = [point.time for point in target.via]
+    if target.duration is None:
+        assert set(times) <= {None}
+    else:
+        assert all(a < b for a, b in pairwise([0.0, *times, target.duration]))

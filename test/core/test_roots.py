@@ -20,6 +20,15 @@ EXACT = {
     'half in the centre': [0, 1, -2, 3600, -1600 + 100j, -1600 - 100j],
     'near the real axis': [0, 0, 0, 0, 2500 + 1e-3j, 2500 - 1e-3j],
     'near the imaginary axis': [0, 0, 0, 0, -2500 + 1e-3j, -2500 - 1e-3j],
+    # Linked across the real axis, not the imaginary one, though Re z is negative on the whole.
+    'real, wider than its distance from zero': [
+        0,
+        14.2,
+        4.7 + 15.1j,
+        4.7 - 15.1j,
+        -13.9 + 29.9j,
+        -13.9 - 29.9j,
+    ],
     'min potential energy': [0, 0, *(6.0e4 * np.exp(1j * np.pi * np.array([1, 3, 5, 7]) / 4))],
 }
 """Roots z = beta^2 in normalised time."""

@@ -1,17 +1,19 @@
 """A session answers goals by time and measurement, without a clock and without ROS."""
 
 from dataclasses import replace
-from math import nan, pi
+from math import inf, nan, pi
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
+from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import PlanningOptions
 from flat_planner_ros.core.session import Outcome, PlannerSession, SessionSettings, StartSource
 from flat_planner_ros.core.simulation import SimulatedArm
+from flat_planner_ros.core.timing import OnViolation
 import numpy as np
 import pytest
 
@@ -60,6 +62,86 @@ def test_planning_time_does_not_eat_the_start_delay():
     assert session().submit(stamped, NOW, lambda: NOW + 2.0).start == NOW + 7.0
     error = reason_of(session().submit, stamped, NOW, lambda: NOW + 8.0)
     assert error.reason is Reason.OLD_HEADER_TIMESTAMP
+
+
+VIA = replace(
+    GOAL,
+    points=(
+        GoalPoint(time=0.4, positions=(1.0,)),
+        GoalPoint(time=0.9, positions=(0.2,)),
+        GoalPoint(time=1.5, positions=(2.0,)),
+    ),
+)
+"""Three points for joint 1, two of them on the way."""
+
+
+def test_via_points_are_passed_at_their_times():
+    motion = session().submit(VIA, NOW)
+    assert motion.end == motion.start + 1.5
+    passed = motion.plan.at(np.array([0.4, 0.9])).positions.sum(axis=1)
+    assert passed == pytest.approx([1.0, 0.2], abs=1e-12)
+    assert motion.samples.positions[-1].tolist() == [2.0, 0.0]
+    # The grid of a command stays even, whatever the times of the points.
+    assert np.ptp(np.diff(motion.samples.times)) < 1e-12
+
+
+def test_via_points_without_times_are_passed_when_it_costs_least():
+    points = tuple(replace(point, time=0.0) for point in VIA.points)
+    motion = session(default_duration=1.5).submit(replace(VIA, points=points), NOW)
+    prescribed = session().submit(VIA, NOW)
+    assert motion.plan.duration == 1.5
+    assert motion.plan.cost_value < prescribed.plan.cost_value
+    times = np.array([point.time for point in motion.plan.request.via])
+    passed = motion.plan.at(times).positions.sum(axis=1)
+    assert passed == pytest.approx([1.0, 0.2], abs=1e-12)
+
+
+def test_via_points_keep_their_shares_of_the_shortest_duration():
+    limits = JointLimits.of(2, velocity=(2.5, inf))
+    free = session(limits=limits)
+    error = reason_of(free.submit, VIA, NOW)
+    assert error.reason is Reason.VELOCITY_LIMIT
+    scaled = session(limits=limits, on_violation=OnViolation.SCALE).submit(VIA, NOW)
+    assert scaled.plan.duration == pytest.approx(error.duration_min, rel=1e-3)
+    shares = [point.time / scaled.plan.duration for point in scaled.plan.request.via]
+    assert shares == pytest.approx([0.4 / 1.5, 0.9 / 1.5])
+    points = tuple(replace(point, time=0.0) for point in VIA.points)
+    chosen = session(limits=limits).submit(replace(VIA, points=points), NOW)
+    assert chosen.plan.duration == chosen.duration_min < scaled.plan.duration
+    assert chosen.plan.peak_velocity[0] == pytest.approx(2.5, rel=3e-3)
+    times = np.array([point.time for point in chosen.plan.request.via])
+    passed = chosen.plan.at(times).positions.sum(axis=1)
+    assert passed == pytest.approx([1.0, 0.2], abs=1e-12)
+
+
+def test_via_points_beyond_the_position_limits_are_refused():
+    limits = JointLimits.of(2, position_max=(0.9, inf))
+    error = reason_of(session(limits=limits).submit, VIA, NOW)
+    assert error.reason is Reason.POSITION_LIMIT
+    assert 'via point 0' in str(error)
+
+
+def test_the_insensitive_strategy_refuses_via_points():
+    options = PlanningOptions(strategy=Strategy.INSENSITIVE)
+    error = reason_of(session(options=options).submit, VIA, NOW)
+    assert error.reason is Reason.INVALID_GOAL
+    assert 'insensitive' in str(error)
+
+
+def test_via_points_of_a_start_in_motion():
+    planner = session()
+    planner.submit(GOAL, NOW)
+    now = NOW + 0.4
+    motion = planner.submit(VIA, now)
+    assert motion.plan.request.start_jets is not None
+    passed = motion.plan.at(np.array([0.4, 0.9])).positions.sum(axis=1)
+    assert passed == pytest.approx([1.0, 0.2], abs=1e-12)
+
+
+def test_via_points_too_close_in_time_are_refused():
+    points = (VIA.points[0], replace(VIA.points[1], time=0.4 + 1e-9), VIA.points[2])
+    error = reason_of(session().submit, replace(VIA, points=points), NOW)
+    assert error.reason is Reason.ILL_CONDITIONED
 
 
 def test_a_small_measured_deflection_does_not_enter_the_plan():

@@ -205,7 +205,7 @@ def refused_goals() -> dict[str, tuple[JointTrajectory, str, str]]:
     missing.joint_names = ['joint2']
     loaded = goal(positions=[1.0, 0.2])
     loaded.joint_names = ['joint1', 'joint2']
-    via = goal()
+    via = goal(velocities=[0.5])
     via.points = [*via.points, *goal(duration=2.0).points]
     standing = goal()
     standing.points = [*standing.points, *standing.points]
@@ -233,7 +233,7 @@ def refused_goals() -> dict[str, tuple[JointTrajectory, str, str]]:
         'too short': (goal(duration=1e-9), '-113', 'DURATION_OUT_OF_RANGE'),
         'too long': (goal(duration=1e9), '-113', 'DURATION_OUT_OF_RANGE'),
         'past': (goal(stamp=1.0), '-3', 'OLD_HEADER_TIMESTAMP'),
-        'via point': (via, '-1', 'INVALID_GOAL'),
+        'moving via point': (via, '-1', 'INVALID_GOAL'),
         'enormous': (many, '-1', 'INVALID_GOAL'),
     }
 

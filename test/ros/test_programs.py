@@ -43,7 +43,7 @@ def test_the_experiment_explains_itself():
     answer = subprocess.run(
         [str(script('paper_table')), '--help'], capture_output=True, text=True, check=True
     )
-    for option in ('--plot', '--csv', '--real-time'):
+    for option in ('--beyond', '--plot', '--csv', '--real-time'):
         assert option in answer.stdout
 
 

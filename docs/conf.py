@@ -1,0 +1,37 @@
+"""Sphinx configuration: `make docs` builds the site into build/docs."""
+
+from pathlib import Path
+import re
+import sys
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / '_extensions'))
+
+project = 'flat_planner_ros'
+author = 'flat_planner_ros developers'
+copyright = author  # noqa: A001  Sphinx reads this name.
+version = re.search(r"version='([^']+)'", (HERE.parent / 'setup.py').read_text('utf-8')).group(1)
+release = version
+
+extensions = [
+    'myst_parser',
+    'sphinx.ext.autodoc',
+    'numpydoc',
+    'sphinx.ext.mathjax',
+    'sphinx.ext.viewcode',
+    'api_reference',
+]
+
+myst_enable_extensions = ['amsmath', 'dollarmath', 'colon_fence']
+myst_heading_anchors = 3
+numpydoc_show_class_members = False
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'signature'
+autodoc_preserve_defaults = True
+python_display_short_literal_types = True
+
+html_theme = 'furo'
+html_title = f'flat_planner_ros {version}'
+html_copy_source = False
+exclude_patterns = ['_extensions']
+nitpicky = False
