@@ -103,7 +103,17 @@ def remedy(
     counterbalance_mass: npt.ArrayLike,
     counterbalance_arm: npt.ArrayLike,
 ) -> str:
-    """Return in words which counterbalances would balance an arm; parameters as above."""
+    """
+    Return in words which counterbalances would balance an arm.
+
+    Parameters
+    ----------
+    link_length, link_com, link_mass
+        As for `counterbalances`, shape (n,) [m], [m], [kg].
+    counterbalance_mass, counterbalance_arm
+        Those that the arm has, shape (2,) [kg], [m].
+
+    """
     links = {'link_length': link_length, 'link_com': link_com, 'link_mass': link_mass}
     ways = []
     for given, value in (('mass', counterbalance_mass), ('arm', counterbalance_arm)):
@@ -130,7 +140,7 @@ def displaced_com(
     Parameters
     ----------
     link_com, link_mass
-        As above, shape (n,).
+        As for `counterbalances`, shape (n,) [m], [kg].
     imbalance
         Static moments added to links n-1 and n, positive towards the links' ends, shape (2,)
         [kg m]: their own masses are moved.

@@ -160,7 +160,8 @@ class Plan:
         Return RMS values and peaks.
 
         The nodes of the quadrature resolve every mode: RMS values are good to 1e-9 of themselves,
-        peaks are those at the nodes, within 2e-3 of the true ones from below.
+        with Coulomb friction to 1e-4; peaks are those at the nodes, within 2e-3 of the true ones
+        from below.
         """
         course = self.course
         if (

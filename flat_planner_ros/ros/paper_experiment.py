@@ -52,6 +52,7 @@ PASSING = (
     'NOT_AT_REST',
     'OLD_HEADER_TIMESTAMP',
     'START_STATE_MISMATCH',
+    'START_STATE_UNKNOWN',
     'START_STATE_STALE',
 )
 """Rejections that a later try overcomes: the planner has not seen the reset, or was late."""

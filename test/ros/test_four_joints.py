@@ -22,12 +22,12 @@ SPEED = 2.0
 class Suite:
     """The three nodes with one parameter file, the plant owning the time."""
 
-    def __init__(self, graph, file, planner=None, plant=None):
+    def __init__(self, graph, file, planner=None, plant=None, speed=SPEED):
         """Start them and wait until they have found each other."""
         self.graph = graph
         given = ('--params-file', str(CONFIG / file))
         simulated = {'use_sim_time': True}
-        clock = {'publish_clock': True, 'real_time_factor': SPEED}
+        clock = {'publish_clock': True, 'real_time_factor': speed}
         slow = {'reference_rate': 10.0, 'start_delay': 0.5}
         graph.create(PlannerNode, {**simulated, **slow, **(planner or {})}, *given)
         graph.create(MonitorNode, {**simulated, 'window': 2.0}, *given)
@@ -45,9 +45,9 @@ class Suite:
             'the three nodes on joint_states',
         )
 
-    def move(self, angles, duration=1.5):
-        """Send a goal for the actuated joints; return the values of the report on its motion."""
-        verdicts, reports = len(self.status), len(self.reports)
+    def send(self, angles, duration=1.5):
+        """Send a goal for the actuated joints; return the values of its verdict."""
+        before = len(self.verdicts('ACCEPTED', 'REJECTED'))
         goal = JointTrajectory(joint_names=[f'joint{i + 1}' for i in range(len(angles))])
         goal.points = [
             JointTrajectoryPoint(
@@ -55,10 +55,28 @@ class Suite:
             )
         ]
         self.graph.publish('/flat_planner/goal', goal)
-        self.graph.expect(lambda: len(self.status) > verdicts, 'a verdict')
-        assert values(self.status[verdicts])['state'] == 'ACCEPTED', self.status[verdicts]
-        self.graph.expect(lambda: len(self.reports) > reports, 'a report', timeout=40.0)
+        self.graph.expect(lambda: len(self.verdicts('ACCEPTED', 'REJECTED')) > before, 'a verdict')
+        verdict = self.verdicts('ACCEPTED', 'REJECTED')[before]
+        assert verdict['state'] == 'ACCEPTED', self.status
+        return verdict
+
+    def move(self, angles, duration=1.5):
+        """Carry a goal out; return the values of the report on its motion."""
+        before = len(self.reports)
+        self.send(angles, duration)
+        self.graph.expect(lambda: len(self.reports) > before, 'a report', timeout=40.0)
         return values(self.reports[-1])
+
+    def wait_into(self, verdict, elapsed):
+        """Wait for a time within an accepted motion."""
+        time = float(verdict['start_time']) + elapsed
+        self.graph.expect(
+            lambda: conversions.seconds(self.states[-1].header.stamp) >= time, f'{time} s'
+        )
+
+    def verdicts(self, *states):
+        """Return the values of all verdicts with one of these states."""
+        return [found for message in self.status if (found := values(message))['state'] in states]
 
 
 def values(message: DiagnosticArray) -> dict[str, str]:
@@ -82,6 +100,23 @@ def test_four_joints_in_a_vertical_plane_end_at_rest(graph):
     back = suite.move([0.4, 0.5, -0.3])
     assert float(back['amplitude']) < 1e-5
     assert (final_errors(back, (1, 2, 3)) < 2e-5).all()
+
+
+@pytest.mark.timeout(240)
+def test_new_goals_and_a_stop_in_motion_leave_the_vertical_arm_at_rest(graph):
+    """Spliced commands hold the arm's weight all the way."""
+    suite = Suite(graph, 'arm_4dof.yaml', planner={'replan.lookahead': 0.25}, speed=0.5)
+    suite.wait_into(suite.send([1.6, -0.6, 0.5]), 0.5)
+    verdict = suite.send([0.2, 0.9, -0.4])
+    suite.wait_into(verdict, 0.6)
+    assert graph.call(Trigger, '/flat_planner/stop').success
+    graph.expect(lambda: suite.verdicts('STOPPED'), 'the stop', timeout=30.0)
+    assert len(suite.verdicts('PREEMPTED')) == 1
+    graph.expect(lambda: suite.reports, 'a report', timeout=40.0)
+    report = values(suite.reports[-1])
+    assert float(report['amplitude']) < 1e-5
+    assert (final_errors(report, (1, 2, 3)) < 2e-5).all()
+    assert np.abs(suite.commands[-1].points[-1].effort[:2]).min() > 0.5
 
 
 def test_the_command_of_an_arm_with_weight_holds_it_at_its_ends(graph):
