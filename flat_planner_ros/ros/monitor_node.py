@@ -15,7 +15,6 @@ from flat_planner_ros.ros import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.monitor_parameters import build, ROWS
 from flat_planner_ros.ros.node_runner import run
 from flat_planner_ros.ros.parameters import NodeParameters
-from flat_planner_ros.ros.stamp_clock import StampClock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -33,6 +32,28 @@ SAME_CLOCK = 3600.0
 
 WARNING_PERIOD = 5.0
 """Shortest time between two warnings about the same input [s]."""
+
+
+class _StampClock:
+    """
+    The time of the joint states' stamps, carried on by the node's clock while none come.
+
+    The two clocks may differ: a simulator or a recording stamps in its own time. Before the first
+    joint state the node's clock stands for both.
+    """
+
+    def __init__(self) -> None:
+        """Wait for the first joint state."""
+        self.stamp: float | None = None
+        self._seen: float | None = None
+        self._offset = 0.0
+
+    def now(self, node_time: float) -> float:
+        """Return the present time of the stamps [s]."""
+        if self.stamp is not None and self.stamp != self._seen:
+            self._seen = self.stamp
+            self._offset = self.stamp - node_time
+        return node_time + self._offset
 
 
 class MonitorNode(Node):
@@ -65,7 +86,7 @@ class MonitorNode(Node):
     def _forget(self) -> None:
         """Wait for a plan, as at the start."""
         self._monitor.reset()
-        self._stamps = StampClock()
+        self._stamps = _StampClock()
         self._reader: conversions.JointStateReader | None = None
         self._plan: PlannedMotion | None = None
         self._report: VibrationReport | None = None
