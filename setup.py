@@ -17,7 +17,10 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', sorted(glob('config/*.yaml'))),
-        (f'share/{package_name}/config/ros2_control', sorted(glob('config/ros2_control/*'))),
+        *(
+            (f'share/{package_name}/{folder}', sorted(glob(f'{folder}*.*')))
+            for folder in sorted(glob('config/*/'))
+        ),
         (f'share/{package_name}/launch', sorted(glob('launch/*.py'))),
     ],
     python_requires='>=3.10',

@@ -1,7 +1,15 @@
 """The planner, the plant and the monitor, each in its own process, from one parameter file."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from pathlib import Path
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    SetLaunchConfiguration,
+)
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile, ParameterValue
@@ -11,45 +19,63 @@ PACKAGE = 'flat_planner_ros'
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Describe the arguments and the three nodes."""
-    default_file = PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'arm_2dof.yaml'])
-    use_sim_time = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
+    """Describe the arguments that planner.launch.py has not, and start both."""
     return LaunchDescription(
         [
             DeclareLaunchArgument(
-                'namespace', default_value='', description='namespace of the three nodes'
+                'scenario',
+                default_value='',
+                choices=['', '1', '2', '3'],
+                description="the paper's: 1 no damping, 2 damping, 3 plant 10 % stiffer and more "
+                'damped; empty = as in params_file',
             ),
             DeclareLaunchArgument(
-                'use_sim_time',
-                default_value='false',
+                'command_topic',
+                default_value='flat_planner/joint_trajectory',
+                description='from the planner to the plant',
+            ),
+            DeclareLaunchArgument(
+                'view',
+                default_value='true',
                 choices=['true', 'false'],
-                description='take the time from /clock',
+                description='publish robot descriptions and transforms, where ROS has what it '
+                'takes',
             ),
-            DeclareLaunchArgument(
-                'params_file', default_value=default_file, description='parameters of the arm'
+            OpaqueFunction(function=_scenario),
+            IncludeLaunchDescription(
+                PythonLaunchDescriptionSource(str(Path(__file__).with_name('planner.launch.py')))
             ),
-            DeclareLaunchArgument(
-                'log_level', default_value='info', description='debug, info, warn, error or fatal'
-            ),
-            *(
-                Node(
-                    package=PACKAGE,
-                    executable=executable,
-                    name=name,
-                    namespace=LaunchConfiguration('namespace'),
-                    parameters=[
-                        # Substitution makes launch read the file, and so miss a missing one.
-                        ParameterFile(LaunchConfiguration('params_file'), allow_substs=True),
-                        {'use_sim_time': use_sim_time},
-                    ],
-                    ros_arguments=['--log-level', LaunchConfiguration('log_level')],
-                    output='screen',
-                )
-                for executable, name in (
-                    ('planner_node', 'flat_planner'),
-                    ('plant_node', 'flat_plant'),
-                    ('monitor_node', 'flat_monitor'),
-                )
-            ),
+            OpaqueFunction(function=_plant),
         ]
     )
+
+
+def _scenario(context: LaunchContext) -> list[SetLaunchConfiguration]:
+    """Lay the scenario's parameters over those of the arm."""
+    scenario = LaunchConfiguration('scenario').perform(context)
+    if not scenario:
+        return []
+    name = f'scenario_{scenario}.yaml'
+    file = PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'scenarios', name])
+    return [SetLaunchConfiguration('overlay_file', file)]
+
+
+def _plant(context: LaunchContext) -> list[Node]:
+    """Return the plant; with use_sim_time it makes the time that all others take."""
+    overlay = LaunchConfiguration('overlay_file').perform(context)
+    files = [LaunchConfiguration('params_file'), *([overlay] if overlay else [])]
+    use_sim_time = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
+    return [
+        Node(
+            package=PACKAGE,
+            executable='plant_node',
+            name='flat_plant',
+            namespace=LaunchConfiguration('namespace'),
+            parameters=[
+                *(ParameterFile(file, allow_substs=True) for file in files),
+                {'publish_clock': use_sim_time},
+            ],
+            ros_arguments=['--log-level', LaunchConfiguration('log_level')],
+            output='screen',
+        )
+    ]

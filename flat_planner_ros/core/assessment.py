@@ -61,16 +61,19 @@ def assess(
         for joint in range(len(motion.joint_names))
     )
     late = float(times[0]) - motion.end if times.size else 0.0
-    remarks = (
-        cause,
-        fit.reason,
-        f'first sample {late:.3g} s after the motion'
-        if late > WINDOW_GAP * settings.window
-        else '',
-        _settling_remark(settling, settings.settling_band),
-        _effort_remark(motion.joint_names, rms),
-        _estimate_remark(estimate, fit),
-    )
+    # Nothing seen is said once, not once for every number that is missing.
+    remarks: tuple[str, ...] = (cause or fit.reason,)
+    if times.size:
+        remarks = (
+            cause,
+            fit.reason,
+            f'first sample {late:.3g} s after the motion'
+            if late > WINDOW_GAP * settings.window
+            else '',
+            _settling_remark(settling, settings.settling_band),
+            _effort_remark(motion.joint_names, rms),
+            _estimate_remark(estimate, fit),
+        )
     return VibrationReport(
         level=Level.STALE if stale else _level(fit, settings),
         message='; '.join((_verdict(fit, settings), *filter(None, remarks))),

@@ -49,11 +49,17 @@ MAX_ROUNDS = 150
 MIN_WEIGHT = 0.1
 """Weight at which the residual has no say any more."""
 
-SEARCH_TOLERANCE = 1e-3
+FIRST_WEIGHT = 60.0
+"""Weight from which one is searched for that takes a prescribed effort."""
+
+STRIDE = 0.5
+"""Steps in which a weight is searched for, in its decimal logarithm [-]."""
+
+SEARCH_TOLERANCE = 2e-3
 """Of the decimal logarithm of a weight that is searched for [-]."""
 
-MARGIN = 5e-3
-"""Share of a prescribed bound that is kept in reserve for the tolerances of the search [-]."""
+MARGIN = 1e-3
+"""Share of a prescribed bound that is kept in reserve for roundoff and sampling [-]."""
 
 REFRESHED = 0.05
 """Share of all weights that is spread evenly again between two steps of a search [-]."""
@@ -169,7 +175,7 @@ def _solved(
     problem = _Problem.of(arm, duration, wanted)
     if wanted.max_residual > 0.0:
         limit = (1.0 - MARGIN) * wanted.max_residual / distance
-        found = _search(problem, lambda c: problem.worst(c) / limit, rises=False)
+        found = _search(problem, lambda c: problem.worst(c) / limit, 1.0 / limit, rises=False)
         if (reached := distance * problem.worst(found.c)) > wanted.max_residual:
             raise OutOfReach(
                 'residual',
@@ -183,7 +189,7 @@ def _solved(
     elif wanted.max_effort_rms > 0.0:
         least = least_effort(arm, distance, duration)
         limit = (1.0 - MARGIN) * wanted.max_effort_rms / least
-        found = _search(problem, lambda c: problem.effort(c) / limit, rises=True)
+        found = _search(problem, lambda c: problem.effort(c) / limit, FIRST_WEIGHT, rises=True)
         if (taken := found.effort * least) > wanted.max_effort_rms:
             raise OutOfReach(
                 'effort',
@@ -399,7 +405,7 @@ def _box_nodes(
 
 
 def _search(
-    problem: _Problem, share: Callable[[FloatArray], float], *, rises: bool
+    problem: _Problem, share: Callable[[FloatArray], float], guess: float, *, rises: bool
 ) -> _Compromise:
     """
     Return the compromise whose share of a bound is 1, or the nearest that there is.
@@ -410,6 +416,8 @@ def _search(
         What is solved for every weight.
     share
         Quantity over its bound, of the coefficients.
+    guess
+        Weight to begin with [-].
     rises
         Whether it rises with the weight, as the effort does; the residual falls.
 
@@ -420,6 +428,8 @@ def _search(
 
     def miss(exponent: float) -> float:
         """Return the logarithm of the share at a weight, solved from its neighbour's shares."""
+        if exponent in known:
+            return log10(share(known[exponent].c))
         shares = None
         if known and problem.is_minimax:
             near = known[min(known, key=lambda other: abs(other - exponent))]
@@ -427,17 +437,19 @@ def _search(
         known[exponent] = problem.solve(10.0**exponent, shares)
         return log10(share(known[exponent].c))
 
-    low, high = log10(MIN_WEIGHT), log10(MAX_INSENSITIVITY)
-    # The bound holds at one end of the range if it can hold at all.
-    safe, other = (low, high) if rises else (high, low)
-    if miss(safe) >= 0.0:
-        return known[safe]
-    if miss(other) <= 0.0:
-        return known[other]
-    exponent = brentq(miss, low, high, xtol=SEARCH_TOLERANCE)
-    step = SEARCH_TOLERANCE if safe == high else -SEARCH_TOLERANCE
+    # From the guess towards the other side of the bound, until it is passed or out of reach.
+    lowest, highest = log10(MIN_WEIGHT), log10(MAX_INSENSITIVITY)
+    near = far = min(max(log10(guess), lowest), highest)
+    is_beyond = miss(near) > 0.0
+    stride = STRIDE if is_beyond is not rises else -STRIDE
+    while (miss(far) > 0.0) is is_beyond:
+        near, far = far, min(max(far + stride, lowest), highest)
+        if near == far:
+            return known[far]
+    exponent = brentq(miss, near, far, xtol=SEARCH_TOLERANCE)
+    step = -SEARCH_TOLERANCE if rises else SEARCH_TOLERANCE
     # The root may be a little on the wrong side, and the share not quite smooth.
-    while miss(exponent) > 0.0 and low < exponent < high:
+    while miss(exponent) > 0.0 and lowest < exponent < highest:
         exponent += step
         step *= 2.0
     return known[exponent]

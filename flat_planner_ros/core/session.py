@@ -228,8 +228,11 @@ class PlannerSession:
         return self._last_goal
 
     def measure(self, sample: JointSample) -> None:
-        """Take the measured state, in the order of the session's joints."""
-        self._measured = sample
+        """Take the measured state, in the order of the session's joints, unless it comes late."""
+        age = 0.0 if self._measured is None else self._measured.time - sample.time
+        # Far back is no late message, but a clock that was set back.
+        if not 0.0 < age <= self.settings.measurement_timeout:
+            self._measured = sample
 
     def submit(self, goal: Goal, now: float, clock: Clock | None = None) -> Motion:
         """

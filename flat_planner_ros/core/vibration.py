@@ -5,8 +5,24 @@ from math import inf, isfinite, nan
 
 from flat_planner_ros.core.assessment import assess
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.motion_record import JointSample, PlannedMotion, Record, Residual
+from flat_planner_ros.core.motion_record import (
+    Array,
+    JointSample,
+    PlannedMotion,
+    Record,
+    Residual,
+)
 from flat_planner_ros.core.vibration_report import MonitorSettings, VibrationReport
+import numpy as np
+
+JUMP = 0.2
+"""Change of a joint angle between two samples, beyond its velocity's, that is no motion [rad]."""
+
+CURVATURE = 1.5
+"""Mean velocity between two samples at most, relative to the larger one at either end [-]."""
+
+UNKNOWN_SPEED = 30.0
+"""Speed that a joint may have where its velocity is not measured [rad/s]."""
 
 
 class Phase(Enum):
@@ -30,7 +46,8 @@ class VibrationMonitor:
     replaces the one that still waits for its start; one that has started is judged on what was
     measured until the next starts, or dropped without a report if it was still moving then. A
     plan that is first seen after its window gives no report: nothing was watched. Only samples
-    end a window; silence ends it as stale.
+    end a window; silence ends it as stale, and a joint that jumps, as an arm that is reset does,
+    ends it there.
 
     Parameters
     ----------
@@ -50,7 +67,9 @@ class VibrationMonitor:
         self._motion: PlannedMotion | None = None
         self._pending: PlannedMotion | None = None
         self._now = self._last_sample = self._heard = -inf
-        self._dropped = 0
+        self._last: JointSample | None = None
+        self._dropped = self._told = 0
+        self._set_back = 0.0
         self._positions = self._efforts = Record(0)
 
     @property
@@ -67,6 +86,19 @@ class VibrationMonitor:
     def dropped(self) -> int:
         """Return the number of unusable samples since the last reset [-]."""
         return self._dropped
+
+    def take_troubles(self) -> list[str]:
+        """Return what was wrong with the samples since this was last asked, a sentence each."""
+        troubles, new = [], self._dropped - self._told
+        if self._set_back:
+            troubles.append(
+                f'the time of the joint states was set back by {self._set_back:.3f} s: plans and '
+                'samples from before are forgotten'
+            )
+        if new:
+            troubles.append(f'{new} joint states dropped: late, repeated or not finite')
+        self._told, self._set_back = self._dropped, 0.0
+        return troubles
 
     def plan(self, motion: PlannedMotion) -> VibrationReport | None:
         """
@@ -111,17 +143,24 @@ class VibrationMonitor:
         """
         time, positions = sample.time, sample.positions
         if time < self._last_sample - self.settings.timeout:
-            self.reset()
+            self._reset_by(self._last_sample - time)
         # The sum of squares is finite only if all positions are.
         if not (time > self._last_sample and isfinite(time + float(positions.dot(positions)))):
             self._dropped += 1
             return None
         report = self._advance(time)
+        former, self._last = self._last, sample
         self._last_sample = self._heard = time
         motion = self._motion
         if motion is None or self._state is Phase.DONE:
             return report
         _check_size(sample, motion)
+        # Between two motions an arm may be put elsewhere, and nobody minds.
+        since = max(motion.start, time - self.settings.timeout)
+        if former is not None and former.time >= since:
+            jump = _jump(former, sample, motion)
+            if jump:
+                return self._close(time, jump)
         if time <= motion.end:
             self._efforts.append(time, nan if sample.efforts is None else sample.efforts)
         if time >= motion.end:
@@ -146,7 +185,7 @@ class VibrationMonitor:
 
         """
         if now < self._now - self.settings.timeout:
-            self.reset()
+            self._reset_by(self._now - now)
         return self._advance(now)
 
     def residual(self, sample: JointSample) -> Residual | None:
@@ -188,6 +227,11 @@ class VibrationMonitor:
         if self._state is Phase.MOVING and self._motion is not None and now >= self._motion.end:
             self._state = Phase.SETTLING
         return self._start_pending(self._now) or report
+
+    def _reset_by(self, step: float) -> None:
+        """Start again after a step back in time [s]."""
+        self.reset()
+        self._set_back = step
 
     def _is_watching(self) -> bool:
         """Return whether a motion has started and has no report yet."""
@@ -235,3 +279,30 @@ def _check_size(sample: JointSample, motion: PlannedMotion) -> None:
     for values in (sample.positions, sample.velocities, sample.efforts):
         if values is not None and values.shape != shape:
             raise InvalidRequest(f'sample of shape {values.shape} for the joints {shape}')
+
+
+def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> str:
+    """Return which joint has come further than it can have moved, if one has."""
+    if former.positions.shape != sample.positions.shape:
+        return ''
+    change = sample.positions - former.positions
+    if np.abs(change).max() <= JUMP:
+        return ''
+    planned = motion.reference(sample.time)[0] - motion.reference(former.time)[0]
+    elapsed = sample.time - former.time
+    speed = np.maximum(_speed(former), _speed(sample))
+    excess = np.minimum(np.abs(change), np.abs(change - planned)) - CURVATURE * elapsed * speed
+    joint = int(np.argmax(excess))
+    if excess[joint] <= JUMP:
+        return ''
+    return (
+        f'{motion.joint_names[joint]} jumped by {change[joint]:.3g} rad within '
+        f'{1e3 * elapsed:.3g} ms at {sample.time:.3f} s'
+    )
+
+
+def _speed(sample: JointSample) -> Array:
+    """Return how fast each joint moves at most, shape (n,) [rad/s]."""
+    if sample.velocities is None:
+        return np.full(sample.positions.shape, UNKNOWN_SPEED)
+    return np.nan_to_num(np.abs(sample.velocities), nan=UNKNOWN_SPEED, posinf=UNKNOWN_SPEED)

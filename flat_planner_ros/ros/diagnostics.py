@@ -195,6 +195,29 @@ def reported_estimate(msg: DiagnosticArray) -> ReportedEstimate | None:
     return None
 
 
+def adopted_values(msg: DiagnosticArray) -> dict[str, float]:
+    """
+    Return stiffness and damping that a planner has adopted, nothing if the message is of goals.
+
+    Raises
+    ------
+    InvalidRequest
+        The values cannot be read.
+
+    """
+    adopted: dict[str, float] = {}
+    for status in msg.status:
+        if status.name == MODEL_NAME:
+            values = {pair.key: pair.value for pair in status.values}
+            try:
+                adopted = {name: float(values[name]) for name in ('stiffness', 'damping')}
+            except (KeyError, ValueError) as error:
+                raise InvalidRequest(
+                    f'adopted model with missing or unreadable {error}'
+                ) from error
+    return adopted
+
+
 def report_status(report: VibrationReport) -> DiagnosticStatus:
     """Return what a motion has left behind."""
     return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _of_report(report))

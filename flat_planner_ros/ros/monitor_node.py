@@ -12,9 +12,11 @@ from flat_planner_ros.core import (
     VibrationReport,
 )
 from flat_planner_ros.ros import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.graph_watch import GraphWatch
 from flat_planner_ros.ros.monitor_parameters import build, ROWS
 from flat_planner_ros.ros.node_runner import run
-from flat_planner_ros.ros.parameters import NodeParameters
+from flat_planner_ros.ros.parameters import InvalidParameter, model_parameters, NodeParameters
+from flat_planner_ros.ros.stamp_clock import StampClock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -34,28 +36,6 @@ WARNING_PERIOD = 5.0
 """Shortest time between two warnings about the same input [s]."""
 
 
-class _StampClock:
-    """
-    The time of the joint states' stamps, carried on by the node's clock while none come.
-
-    The two clocks may differ: a simulator or a recording stamps in its own time. Before the first
-    joint state the node's clock stands for both.
-    """
-
-    def __init__(self) -> None:
-        """Wait for the first joint state."""
-        self.stamp: float | None = None
-        self._seen: float | None = None
-        self._offset = 0.0
-
-    def now(self, node_time: float) -> float:
-        """Return the present time of the stamps [s]."""
-        if self.stamp is not None and self.stamp != self._seen:
-            self._seen = self.stamp
-            self._offset = self.stamp - node_time
-        return node_time + self._offset
-
-
 class MonitorNode(Node):
     """Judges the oscillation after each motion of the latched plan."""
 
@@ -73,6 +53,9 @@ class MonitorNode(Node):
         listen = self.create_subscription
         listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        status = interfaces.of(interfaces.PLANNER, interfaces.STATUS)
+        listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
+        self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -86,7 +69,7 @@ class MonitorNode(Node):
     def _forget(self) -> None:
         """Wait for a plan, as at the start."""
         self._monitor.reset()
-        self._stamps = _StampClock()
+        self._stamps = StampClock()
         self._reader: conversions.JointStateReader | None = None
         self._plan: PlannedMotion | None = None
         self._report: VibrationReport | None = None
@@ -118,6 +101,7 @@ class MonitorNode(Node):
             sample = self._reader.read(msg)
             report = self._monitor.add(sample)
         except FlatPlannerError as error:
+            self._watch.heard_other_part()
             self.get_logger().warning(
                 f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
             )
@@ -131,6 +115,17 @@ class MonitorNode(Node):
                 )
         self._publish_report(report)
 
+    def _on_status(self, msg: DiagnosticArray) -> None:
+        """Expect what the planner expects, once it has adopted other values than its file's."""
+        try:
+            values = diagnostics.adopted_values(msg)
+            if values:
+                result = self.set_parameters_atomically(model_parameters(**values))
+                if not result.successful:
+                    raise InvalidParameter(result.reason)
+        except FlatPlannerError as error:
+            self.get_logger().warning(f"the planner's model is not followed: {error}")
+
     def _on_tick(self) -> None:
         """Notice silence."""
         now, plan = self._stamps.now(self._now()), self._plan
@@ -140,7 +135,9 @@ class MonitorNode(Node):
             self._publish_report(self._monitor.tick(now))
 
     def _on_diagnostics(self) -> None:
-        """Publish the present state."""
+        """Publish the present state, and say what was wrong since the last time."""
+        for trouble in self._monitor.take_troubles():
+            self.get_logger().warning(trouble)
         phase, dropped = self._monitor.state.value, self._monitor.dropped
         status = diagnostics.monitor_status(self._report, phase, dropped)
         self._health.publish(diagnostics.array_of(status, self._now()))

@@ -17,6 +17,7 @@ from flat_planner_ros.core import (
 )
 from flat_planner_ros.ros import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.effort_stream import EffortStream
+from flat_planner_ros.ros.graph_watch import GraphWatch
 from flat_planner_ros.ros.node_runner import run
 from flat_planner_ros.ros.parameters import model_parameters, NodeParameters
 from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
@@ -58,6 +59,8 @@ class PlannerNode(Node):
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
         self.create_service(Trigger, interfaces.STOP, self._on_stop)
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
+        commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
+        self._watch = GraphWatch(self, commands, [interfaces.JOINT_STATES], is_listening=True)
         self._apply(self._settings)
 
     def destroy_node(self) -> None:
@@ -97,6 +100,7 @@ class PlannerNode(Node):
         try:
             self._session.measure(conversions.sample_from_joint_state(msg, self._joints))
         except FlatPlannerError as error:
+            self._watch.heard_other_part()
             self.get_logger().warning(
                 f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
             )

@@ -5,6 +5,7 @@ import sys
 
 from flat_planner_ros.core import ArmState, FlatPlannerError, InvalidCommand, PacedArm
 from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros.graph_watch import GraphWatch
 from flat_planner_ros.ros.node_runner import run
 from flat_planner_ros.ros.parameters import InvalidParameter, NodeParameters
 from flat_planner_ros.ros.plant_parameters import build, CommandInput, PlantSettings, ROWS
@@ -64,6 +65,8 @@ class PlantNode(Node):
         }[self._settings.command_input]
         name = interfaces.of(interfaces.PLANNER, topic)
         self.create_subscription(kind, name, callback, interfaces.RELIABLE)
+        clock = [interfaces.CLOCK] if self._settings.publish_clock else []
+        GraphWatch(self, [name, *clock], [interfaces.JOINT_STATES])
 
     def _apply(self, settings: PlantSettings) -> None:
         """Go on with another mismatch or other sensors."""

@@ -571,3 +571,51 @@ def test_a_motion_cannot_be_changed():
 def test_senseless_settings_are_refused(changes):
     with pytest.raises(InvalidRequest):
         MonitorSettings(**changes)
+
+
+def test_a_report_on_nothing_says_so_once(monitor):
+    motion = planned()
+    monitor.plan(motion)
+    feed(monitor, motion, 9.9, 10.5)
+    message = monitor.tick(11.1).message
+    assert message == 'amplitude unknown; no samples for 0.605 s'
+
+
+def test_a_joint_that_jumps_ends_the_window_there(monitor):
+    motion = planned()
+    monitor.plan(motion)
+    assert feed(monitor, motion, 9.9, 12.0) == []
+    moved = sample(12.0, motion).positions - [0.5, 0.0]
+    report = monitor.add(sample(12.0, motion, positions=moved))
+    assert 'joint1 jumped by -0.5 rad within 5 ms at 12.000 s' in report.message
+    assert report.amplitude == pytest.approx(0.02, rel=1e-3)
+    assert report.window < 1.0
+    assert feed(monitor, motion, 12.005, 14.0) == []
+
+
+@pytest.mark.parametrize('velocities', [True, False])
+@pytest.mark.parametrize('period', [0.005, 0.05, 0.2])
+def test_motion_is_no_jump_however_fast_and_rarely_seen(monitor, velocities, period):
+    motion = planned(duration=0.3, goal=9.0)
+    monitor.plan(motion)
+    times = np.arange(9.9, 10.3 + WINDOW + 0.4, period)
+    changes = {} if velocities else {'velocities': None}
+    reports = [monitor.add(sample(time, motion, **changes)) for time in times]
+    (report,) = [report for report in reports if report is not None]
+    assert 'jumped' not in report.message
+
+
+def test_what_is_wrong_with_samples_is_told_once(monitor):
+    motion = planned()
+    monitor.plan(motion)
+    feed(monitor, motion, 9.9, 10.5)
+    assert monitor.take_troubles() == []
+    for time, values in ((10.4, [0.0, 0.0]), (10.495, [0.0, 0.0]), (10.6, [np.nan, 0.0])):
+        monitor.add(sample(time, motion, positions=np.array(values)))
+    assert monitor.take_troubles() == ['3 joint states dropped: late, repeated or not finite']
+    assert monitor.take_troubles() == []
+    monitor.add(sample(5.0, motion))
+    (trouble,) = monitor.take_troubles()
+    assert trouble.startswith('the time of the joint states was set back by 5.495 s')
+    monitor.tick(4.0)
+    assert 'set back by 1.000 s' in monitor.take_troubles()[0]

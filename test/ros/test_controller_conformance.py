@@ -6,13 +6,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.core import Strategy
 from flat_planner_ros.ros import conversions
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
 from trajectory_controller import broken, Controller, PRECAUTIONS, REFUSALS
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 import yaml
@@ -21,12 +21,6 @@ CONFIG = Path(__file__).resolve().parents[2] / 'config'
 CONTROL = CONFIG / 'ros2_control'
 GOALS = 25
 """Random goals per strategy and form of the command."""
-
-ATTEMPTS = 20
-"""Times a goal is sent until it finds the planner idle."""
-
-PATIENCE = 0.2
-"""Time in which a command follows a verdict [s]; none follows a refusal."""
 
 FORMS = {
     'effort': {},
@@ -49,15 +43,24 @@ def controller(form):
 
 
 class Session:
-    """A planner on simulated time that answers random goals with commands."""
+    """A planner on simulated time that answers goals with commands."""
 
     def __init__(self, graph, **parameters):
         """Start it at some time and rest."""
-        self.graph, self.now = graph, 100.0
+        self.graph, self.now = graph, 0.0
         fixed = {'start.source': 'parameter', 'start.position': [0.5, 0.0], 'use_sim_time': True}
-        graph.create(PlannerNode, {**fixed, **parameters})
+        self.planner = graph.create(PlannerNode, {**fixed, **parameters})
         self.commands = graph.collect(JointTrajectory, 'flat_planner/joint_trajectory')
-        self.verdicts = graph.collect(DiagnosticArray, 'flat_planner/status')
+        self.advance(100.0)
+
+    def advance(self, step):
+        """Let time go on, until the planner knows."""
+        self.now += step
+        self.graph.publish('/clock', Clock(clock=conversions.time_msg(self.now)))
+        self.graph.expect(
+            lambda: self.planner.get_clock().now().nanoseconds >= round(self.now * 1e9),
+            'the time',
+        )
 
     def command(self, angle, duration):
         """Return the command that answers a goal, and when it was received."""
@@ -65,18 +68,14 @@ class Session:
         point = JointTrajectoryPoint(positions=[angle])
         point.time_from_start = conversions.duration_msg(duration)
         goal.points = [point]
+        return self.answer(lambda: self.graph.publish('flat_planner/goal', goal))
+
+    def answer(self, ask):
+        """Return the next command and the time."""
         count = len(self.commands)
-        # Topics keep no order among each other: the planner may see the goal before the time.
-        for _ in range(ATTEMPTS):
-            self.graph.publish('/clock', Clock(clock=conversions.time_msg(self.now)))
-            told = len(self.verdicts)
-            self.graph.publish('flat_planner/goal', goal)
-            self.graph.expect(lambda told=told: len(self.verdicts) > told, 'a verdict')
-            if self.graph.spin_until(lambda: len(self.commands) > count, PATIENCE):
-                break
-        received = self.now
-        self.now += duration + 1.0
-        return self.commands[count], received
+        ask()
+        self.graph.expect(lambda: len(self.commands) > count, 'a command')
+        return self.commands[count], self.now
 
 
 @pytest.mark.parametrize('form', FORMS)
@@ -93,6 +92,7 @@ def test_random_goals_give_commands_that_the_controller_plays(graph, form, strat
     for _ in range(GOALS):
         angle, duration = rng.uniform(-6.0, 6.0), rng.uniform(0.2, 4.0)
         msg, now = session.command(angle, duration)
+        session.advance(duration + 1.0)
         assert broken(player, msg, now) == []
         assert list(msg.joint_names) == list(player.joints)
         assert msg.points[0].positions[0] == 0.5
@@ -103,6 +103,20 @@ def test_random_goals_give_commands_that_the_controller_plays(graph, form, strat
         assert np.ptp(np.diff(times)) < 3e-9  # even, also where the period does not divide
         has_effort = [len(point.effort) > 0 for point in msg.points]
         assert all(has_effort) == any(has_effort) == form.startswith('effort')
+
+
+@pytest.mark.parametrize('form', ['effort', 'position'])  # others need the first to end
+def test_goals_in_motion_and_stops_give_commands_that_the_controller_plays(graph, form):
+    player, session = controller(form), Session(graph, **FORMS[form])
+    rng = np.random.default_rng(len(form))
+    for _ in range(GOALS // 5):
+        session.command(rng.uniform(-3.0, 3.0), 2.0)
+        session.advance(rng.uniform(0.3, 1.5))
+        assert broken(player, *session.command(rng.uniform(-3.0, 3.0), 2.0)) == []
+        session.advance(rng.uniform(0.3, 1.5))
+        stop, now = session.answer(lambda: graph.call(Trigger, 'flat_planner/stop'))
+        assert broken(player, stop, now) == []
+        session.advance(10.0)
 
 
 def spoil(name, msg):

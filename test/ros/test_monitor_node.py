@@ -245,10 +245,10 @@ def test_each_motion_has_its_report_and_latecomers_hear_the_last(graph, bench):
     assert bench.report()[0] == DiagnosticStatus.WARN
     later = START + 10.0
     bench.plan(plan_msg(later, goal=2.0))
-    bench.feed(later + DURATION + WINDOW, later, goal=2.0, amplitude=0.3)
+    bench.feed(later + DURATION + WINDOW, later, goal=2.0, amplitude=0.15)
     level, _, values = bench.report(2)
     assert level == DiagnosticStatus.ERROR
-    assert float(values['amplitude']) == pytest.approx(0.3, rel=1e-6)
+    assert float(values['amplitude']) == pytest.approx(0.15, rel=1e-6)
     late = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED)
     graph.expect(lambda: late, 'the latched report')
     assert late == bench.reports[1:]

@@ -1,0 +1,82 @@
+"""Topics that one node alone may publish: whoever else does is named, once a second."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+WATCH_PERIOD = 1.0
+"""Time between two looks at the graph, and thus between two errors [s]."""
+
+EXCUSED_LOOKS = 5
+"""Looks for which a message about another part explains a second publisher."""
+
+REMARK = 'a killed node stays listed for up to 20 s'
+"""Time for which DDS takes a silent participant for alive."""
+
+
+class GraphWatch:
+    """
+    Looks for topics with several publishers and says who they are.
+
+    Parameters
+    ----------
+    node
+        In whose name.
+    sole
+        Topics that may have one publisher.
+    shared
+        Topics that several nodes may publish, each its part, such as joint states of several
+        robots: an error only if one name publishes twice, or if all that was heard for
+        EXCUSED_LOOKS was about the same part.
+    is_listening
+        Whether the node listens to the shared ones and calls `heard_other_part`.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        sole: Sequence[str],
+        shared: Sequence[str] = (),
+        *,
+        is_listening: bool = False,
+    ) -> None:
+        """Look every WATCH_PERIOD, whatever the time of the graph does."""
+        self._node = node
+        self._sole = [node.resolve_topic_name(topic) for topic in sole]
+        self._shared = [node.resolve_topic_name(topic) for topic in shared]
+        self._is_listening = is_listening
+        self._looks_to_excuse = 0
+        node.create_timer(WATCH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def heard_other_part(self) -> None:
+        """Take note of a message on a shared topic that is not about one's own part."""
+        self._looks_to_excuse = EXCUSED_LOOKS
+
+    def _look(self) -> None:
+        """Report topics with too many publishers."""
+        complaints = [
+            f'{topic} is published by {", ".join(names)}'
+            for topic in (*self._sole, *self._shared)
+            if len(names := self._publishers(topic)) > 1 and self._is_wrong(topic, names)
+        ]
+        self._looks_to_excuse = max(0, self._looks_to_excuse - 1)
+        if complaints:
+            self._node.get_logger().error(
+                f'{"; ".join(complaints)}: only one of them may run ({REMARK})'
+            )
+
+    def _publishers(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that publish on a topic."""
+        if self._node.count_publishers(topic) < 2:
+            return []
+        infos = self._node.get_publishers_info_by_topic(topic)
+        return sorted(f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos)
+
+    def _is_wrong(self, topic: str, names: Sequence[str]) -> bool:
+        """Return whether publishers of a topic exclude each other."""
+        if topic in self._sole or max(Counter(names).values()) > 1:
+            return True
+        return self._is_listening and not self._looks_to_excuse

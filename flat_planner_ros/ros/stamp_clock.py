@@ -1,0 +1,29 @@
+"""The time of joint states, between and after them."""
+
+
+class StampClock:
+    """
+    The time of the joint states' stamps, carried on by another clock while none come.
+
+    The two clocks may differ: a simulator or a recording stamps in its own time. Before the first
+    joint state the other clock stands for both.
+
+    Attributes
+    ----------
+    stamp
+        The last one [s]; set it with every joint state. None before the first.
+
+    """
+
+    def __init__(self) -> None:
+        """Wait for the first joint state."""
+        self.stamp: float | None = None
+        self._seen: float | None = None
+        self._offset = 0.0
+
+    def now(self, other: float) -> float:
+        """Return the present time of the stamps, given that of the other clock [s]."""
+        if self.stamp is not None and self.stamp != self._seen:
+            self._seen = self.stamp
+            self._offset = self.stamp - other
+        return other + self._offset
