@@ -11,10 +11,19 @@ from pathlib import Path
 import platform
 import sys
 
-BENCHMARKS = ('planning', 'scaling', 'node_path', 'plant', 'monitor', 'start_up', 'stream')
+BENCHMARKS = (
+    'planning',
+    'scaling',
+    'node_path',
+    'plant',
+    'monitor',
+    'start_up',
+    'stream',
+    'via_points',
+)
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream')
+WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'

@@ -12,7 +12,6 @@ from flat_planner_ros.core.unit_motion import (
     GRIDS_KEPT,
     JET_ORDER,
     MAX_KEPT_INTERVALS,
-    rounded,
     unit_motion,
     UnitMotion,
 )
@@ -115,8 +114,7 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     half = 0.5 * duration
     powers = half**_ORDERS
     with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
-        normalised = rounded(cost.characteristic() * powers[::-1] ** 2)
-        unit = unit_motion(normalised.tobytes())
+        unit = unit_motion(cost.characteristic() * powers[::-1] ** 2)
         rates = 1.0 / powers
         largest = float((rates * unit.peaks).max())
     # (35) with every derivative in units of the half duration.

@@ -30,15 +30,14 @@ PROBE_DEPTH = 36
 
 KEY_BITS = 48
 """
-Leading bits of the normalised coefficients that identify a unit motion.
+Leading bits of the normalised coefficients under which a unit motion is kept.
 
 Coefficients are computed with errors of a few units in their last, 53rd bit. What is left of them
-differs for equal numbers of two arms only where such an error crosses a multiple of 2^-48. The law
-is that of the rounded coefficients: the same whatever was planned before.
+differs for equal numbers of two arms only where such an error crosses a multiple of 2^-48.
 """
 
-KEY_ROUNDING = 2.0**-KEY_BITS
-"""Largest relative change of a coefficient by rounding; at most this adds to (32) [-]."""
+SAME = 2.0**-49
+"""Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
 
 UNITS_KEPT = 64
 """Unit motions in the cache; the one unused for longest makes room."""
@@ -67,12 +66,14 @@ class UnitMotion:
 
     Attributes
     ----------
+    coefficients
+        a_0 ... a_6 of its equation, shape (7,).
     law
         From -1/2 at t = 0 to 1/2 at t = 2; odd about the middle.
     boundary_residual
         (31) of docs/derivation.md.
     optimality_residual
-        (32) of docs/derivation.md, at most, for coefficients before rounding.
+        (32) of docs/derivation.md, at most, for all coefficients that count as equal.
     momentum
         Conserved momentum (33), here also the cost.
     peaks
@@ -80,6 +81,7 @@ class UnitMotion:
 
     """
 
+    coefficients: FloatArray
     law: MotionLaw
     boundary_residual: float
     optimality_residual: float
@@ -135,15 +137,14 @@ def rounded(coefficients: FloatArray) -> FloatArray:
     return result
 
 
-@lru_cache(maxsize=UNITS_KEPT)
-def unit_motion(key: bytes) -> UnitMotion:
+def unit_motion(coefficients: FloatArray) -> UnitMotion:
     """
-    Return the unit motion of an equation.
+    Return the unit motion of an equation, one that is known if its numbers are the same.
 
     Parameters
     ----------
-    key
-        The bytes of the coefficients a_0 ... a_6 in normalised time.
+    coefficients
+        a_0 ... a_6 in normalised time, shape (7,) [-].
 
     Raises
     ------
@@ -151,7 +152,25 @@ def unit_motion(key: bytes) -> UnitMotion:
         The boundary conditions are singular in double precision.
 
     """
-    coefficients = np.frombuffer(key)
+    kept = kept_units(rounded(coefficients).tobytes())
+    for unit in kept:
+        if (np.abs(unit.coefficients - coefficients) <= SAME * np.abs(coefficients)).all():
+            return unit
+    unit = _certified(coefficients)
+    # In one step: threads that come together compute the same and one of them is kept.
+    kept[:] = [unit]
+    return unit
+
+
+@lru_cache(maxsize=UNITS_KEPT)
+def kept_units(key: bytes) -> list[UnitMotion]:
+    """Return the last unit motion that was found under some leading bits, if there is one."""
+    del key
+    return []
+
+
+def _certified(coefficients: FloatArray) -> UnitMotion:
+    """Return a unit motion with its residuals."""
     law = MotionLaw(duration=2.0, modes=unit_modes(coefficients))
     jet = law.terms.at(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
@@ -160,9 +179,10 @@ def unit_motion(key: bytes) -> UnitMotion:
         peaks[:CONDITIONS] + _ENDS[:, 1]
     )
     return UnitMotion(
+        coefficients=coefficients,
         law=law,
         boundary_residual=float(miss.max()),
-        optimality_residual=stationarity_residual(coefficients, jet) + KEY_ROUNDING,
+        optimality_residual=stationarity_residual(coefficients, jet) + SAME,
         momentum=float(momentum_of(coefficients, jet[:, -2])),
         peaks=peaks,
     )

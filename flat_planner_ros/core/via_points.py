@@ -85,7 +85,7 @@ class OptimalPath:
         Integral of Y^T Q Y over the motion, summed over the variables.
     time_slopes
         Derivatives of the cost with respect to the times of the via points, duration and values
-        fixed ((V9) of docs/derivation.md), shape (p - 1,) [1/s].
+        fixed ((V8) of docs/derivation.md), shape (p - 1,) [1/s].
     boundary_residual
         Largest miss of a prescribed derivative or value, jump of the derivatives 0 to 5, or last
         correction of a derivative, relative to that derivative's peak; at least the rounding of
@@ -256,7 +256,7 @@ def _share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
     """
     Return what a moving start adds to the sum of momenta times steps, with the opposite sign.
 
-    Sum over i = 1 ... 5 of w^(i) times the momentum (V7) of docs/derivation.md.
+    Sum over i = 1 ... 5 of w^(i) times the momentum (V2) of docs/derivation.md.
     """
     share = 0.0
     for i in range(1, CONDITIONS):

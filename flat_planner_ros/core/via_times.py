@@ -2,7 +2,7 @@
 Times of via points that have none: those at which the optimal path is cheapest.
 
 The path itself is solved exactly for any times, and its cost has a derivative with respect to each
-of them ((V9) of docs/derivation.md). So the times are refined by a quasi-Newton method on the same
+of them ((V8) of docs/derivation.md). So the times are refined by a quasi-Newton method on the same
 cost that the strategy minimises, the duration kept.
 """
 
@@ -144,7 +144,7 @@ def _shares(logarithms: FloatArray) -> FloatArray:
 
 
 def _edges(logarithms: FloatArray, duration: float) -> FloatArray:
-    """Return the edges of segments, each at least as long as the least share."""
+    """Return the edges of segments, (V9) of docs/derivation.md."""
     least = LEAST_SHARE / len(logarithms)
     inner = np.cumsum(least + (1.0 - LEAST_SHARE) * _shares(logarithms))[:-1]
     return np.concatenate([[0.0], duration * inner, [duration]])

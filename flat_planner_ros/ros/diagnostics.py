@@ -94,10 +94,12 @@ def accepted_status(
 
     """
     plan = motion.plan
-    peak = plan.peak_effort[-2]
+    peaks = plan.peak_effort
+    strongest = int(peaks.argmax())
     message = (
         f'plan {motion.plan_id}: {plan.options.strategy.value}, {plan.request.duration:g} s, '
-        f'peak effort {peak:.4g} N m, starts at {motion.start:.3f} s'
+        f'peak effort {peaks[strongest]:.4g} N m of {joints[strongest]}, '
+        f'starts at {motion.start:.3f} s'
     )
     values: dict[str, float | int | str | None] = {
         **_of_motion(motion, 'ACCEPTED'),

@@ -248,8 +248,8 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
         return extremal(coefficients, 2.0, Jets(start=-end, end=end * (1.0 + 1e-8))).modes
 
     monkeypatch.setattr(unit_motion, 'unit_modes', wrong)
-    unit_motion.unit_motion.cache_clear()
-    request.addfinalizer(unit_motion.unit_motion.cache_clear)
+    unit_motion.kept_units.cache_clear()
+    request.addfinalizer(unit_motion.kept_units.cache_clear)
     quantity = {'end': 'boundary', 'middle': 'optimality'}[damage]
     with pytest.raises(UncertifiedPlan, match=quantity):
         plan(half_turn(), arm, STRATEGIES['energy'])
@@ -472,7 +472,7 @@ def test_another_distance_and_a_scaled_arm_share_a_unit_motion():
 def test_rounding_of_coefficients_is_bounded():
     values = np.random.default_rng(5).normal(size=1000) * 1e7
     error = np.abs(unit_motion.rounded(values) - values)
-    assert (error <= unit_motion.KEY_ROUNDING * np.abs(values)).all()
+    assert (error <= 2.0**-unit_motion.KEY_BITS * np.abs(values)).all()
     assert error.max() > 0.0
     assert len(np.unique(unit_motion.rounded(1.0 + np.arange(32) * 2.0**-52))) <= 3
 

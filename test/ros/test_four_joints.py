@@ -29,7 +29,7 @@ class Suite:
         simulated = {'use_sim_time': True}
         clock = {'publish_clock': True, 'real_time_factor': speed}
         slow = {'reference_rate': 10.0, 'start_delay': 0.5}
-        graph.create(PlannerNode, {**simulated, **slow, **(planner or {})}, *given)
+        self.planner = graph.create(PlannerNode, {**simulated, **slow, **(planner or {})}, *given)
         graph.create(MonitorNode, {**simulated, 'window': 2.0}, *given)
         graph.create(PlantNode, {**clock, **(plant or {})}, *given)
         status, report = '/flat_planner/status', '/flat_monitor/report'
@@ -100,6 +100,23 @@ def test_four_joints_in_a_vertical_plane_end_at_rest(graph):
     back = suite.move([0.4, 0.5, -0.3])
     assert float(back['amplitude']) < 1e-5
     assert (final_errors(back, (1, 2, 3)) < 2e-5).all()
+
+
+@pytest.mark.parametrize(
+    ('file', 'angles'), [('arm_3dof.yaml', [1.2, 0.8]), ('arm_4dof.yaml', [1.6, -0.6, 0.5])]
+)
+def test_a_goal_without_times_takes_the_shortest_motion_within_the_limits(graph, file, angles):
+    suite = Suite(graph, file)
+    report = suite.move(angles, duration=0.0)
+    (verdict,) = suite.verdicts('ACCEPTED')
+    limits = suite.planner.get_parameters(['limits.velocity', 'limits.effort'])
+    shares = [
+        float(verdict[f'peak_{quantity}.joint{i + 1}']) / limit
+        for quantity, values in zip(('velocity', 'effort'), limits, strict=True)
+        for i, limit in enumerate(values.value)
+    ]
+    assert 0.99 < max(shares) <= 1.0
+    assert float(report['amplitude']) < 1e-5
 
 
 @pytest.mark.timeout(240)
