@@ -30,6 +30,7 @@ class Controller:
     allow_partial_joints_goal: bool = False
     allow_nonzero_velocity_at_trajectory_end: bool = False
     allow_integration_in_goal_trajectories: bool = False
+    has_weight: bool = False  # of the arm: the last effort holds it
 
     @classmethod
     def of(cls, parameters: Mapping[str, Any]) -> 'Controller':
@@ -203,7 +204,8 @@ PRECAUTIONS = (
         'nothing left at the end',
         'the last point is held: an effort or acceleration in it would act for ever',
         lambda c, m, now: (
-            not any(np.any(getattr(m.points[-1], field)) for field in ('accelerations', 'effort'))
+            not np.any(m.points[-1].accelerations)
+            and (c.has_weight or not np.any(m.points[-1].effort))
         ),
     ),
     Rule(

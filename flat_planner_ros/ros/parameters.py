@@ -41,6 +41,17 @@ class InvalidParameter(FlatPlannerError):
     """A parameter that a node cannot work with; the message says what to write instead."""
 
 
+ANY_VALUE = {
+    Parameter.Type.BOOL: 'true or false',
+    Parameter.Type.INTEGER: 'an integer',
+    Parameter.Type.DOUBLE: 'a finite number',
+    Parameter.Type.DOUBLE_ARRAY: 'finite numbers',
+    Parameter.Type.STRING: 'any text',
+    Parameter.Type.STRING_ARRAY: 'different names',
+}
+"""Constraints of parameters that have none of their own."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """
@@ -88,6 +99,16 @@ class Row:
             return ''
         return f'in [{self.lower:g}, {self.upper:g}]'
 
+    @property
+    def _allowed(self) -> str:
+        """Return the constraints, or what any value of the type is, and whether it may change."""
+        allowed = self.constraints or ANY_VALUE[self.type]
+        if self.infinite and not self.constraints:
+            allowed = 'numbers, or .inf'
+        if isinstance(self.default, Parameter.Type):
+            allowed += '; may be left out'
+        return f'{allowed}; fixed at the start' if self.read_only else allowed
+
     def descriptor(self) -> ParameterDescriptor:
         """Return what ROS tools show and check."""
         ranges = []
@@ -100,7 +121,7 @@ class Row:
             )
         return ParameterDescriptor(
             description=self.description,
-            additional_constraints=self.constraints,
+            additional_constraints=self._allowed,
             floating_point_range=ranges,
             read_only=self.read_only,
         )

@@ -8,7 +8,10 @@ from types import SimpleNamespace
 from builtin_interfaces.msg import Time
 from flat_planner_ros.core import Strategy
 from flat_planner_ros.ros import conversions
+from flat_planner_ros.ros.parameter_file import read_settings
+from flat_planner_ros.ros.parameters import arm_of
 from flat_planner_ros.ros.planner_node import PlannerNode
+from flat_planner_ros.ros.planner_parameters import ROWS
 import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
@@ -62,10 +65,10 @@ class Session:
             'the time',
         )
 
-    def command(self, angle, duration):
+    def command(self, angles, duration, joints=('joint1',)):
         """Return the command that answers a goal, and when it was received."""
-        goal = JointTrajectory(joint_names=['joint1'])
-        point = JointTrajectoryPoint(positions=[angle])
+        goal = JointTrajectory(joint_names=list(joints))
+        point = JointTrajectoryPoint(positions=np.ravel(angles).tolist())
         point.time_from_start = conversions.duration_msg(duration)
         goal.points = [point]
         return self.answer(lambda: self.graph.publish('flat_planner/goal', goal))
@@ -103,6 +106,29 @@ def test_random_goals_give_commands_that_the_controller_plays(graph, form, strat
         assert np.ptp(np.diff(times)) < 3e-9  # even, also where the period does not divide
         has_effort = [len(point.effort) > 0 for point in msg.points]
         assert all(has_effort) == any(has_effort) == form.startswith('effort')
+
+
+@pytest.mark.parametrize('file', sorted(CONFIG.glob('arm_*.yaml')), ids=lambda file: file.stem)
+def test_commands_of_every_shipped_arm_are_played(graph, file):
+    values = read_settings(file, ROWS, dict, node='flat_planner')
+    joints, arm = arm_of(values)
+    player = Controller(
+        joints=joints,
+        command_joints=joints[:-1],
+        command_interfaces=['effort'],
+        state_interfaces=['position', 'velocity'],
+        has_weight=arm.gravity != 0.0,
+    )
+    start = [0.0] * len(joints)
+    session = Session(graph, **{**values, 'start.source': 'parameter', 'start.position': start})
+    for duration in (1.37, 2.0):
+        msg, now = session.command([0.4] * (len(joints) - 1), duration, joints[:-1])
+        assert broken(player, msg, now) == []
+        assert tuple(msg.joint_names) == joints
+        last = msg.points[-1]
+        holding = arm.gravity_effort(np.array(last.positions))
+        assert np.allclose(last.effort, holding, rtol=0, atol=1e-9 * max(1.0, *abs(holding)))
+        session.advance(duration + 1.0)
 
 
 @pytest.mark.parametrize('form', ['effort', 'position'])  # others need the first to end
