@@ -45,8 +45,9 @@ test: lint  ## ruff, mypy and all tests
 	$(BIN)/python -c '$(PYTEST)' -n 2 --dist loadfile --timeout=120 $(ARGS)
 
 fuzz: export FUZZ_CASES ?= 100000
-fuzz: install  ## random motions against multiple precision, FUZZ_CASES=100000 by default
-	$(BIN)/python -c '$(PYTEST)' -s test/fuzz $(ARGS)
+fuzz: export RANDOM_MESSAGES ?= 10000
+fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
+	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/test_random_messages.py $(ARGS)
 
 bench: install $(PEERS)  ## speed beside other libraries, and of the nodes; benchmarks/results.md
 	$(BIN)/python benchmarks/run.py $(ARGS)

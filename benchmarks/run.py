@@ -20,10 +20,11 @@ BENCHMARKS = (
     'start_up',
     'stream',
     'via_points',
+    'duration',
 )
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points')
+WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'

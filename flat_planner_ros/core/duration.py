@@ -1,5 +1,5 @@
 """
-Shortest duration of a motion within the limits of its joints (docs/derivation.md, section 9).
+Shortest duration of a motion within the limits of its joints (docs/derivation.md, section L).
 
 Peaks fall with the duration, velocities nearly with its first power, efforts and deflections with
 its second; but the shape of a law changes with its duration, gravity does not fall at all, and a
@@ -20,6 +20,7 @@ from flat_planner_ros.core.errors import (
 from flat_planner_ros.core.extrema import Quantity
 from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning import Plan
+import numpy as np
 
 DURATION_TOLERANCE = 2e-4
 """Distance of the answer to a shorter duration that breaks a limit, relative to it [-]."""
@@ -38,6 +39,9 @@ FIRST_STRIDE = 1.1
 
 DIGITS = 9
 """Significant digits of the durations tried: as many as are reported."""
+
+SAMPLES = 33
+"""Times at which a duration of a scan is looked at: most are ruled out by that."""
 
 POWERS = {Quantity.POSITION: 2.0, Quantity.VELOCITY: 1.0, Quantity.EFFORT: 2.0}
 """How the use of a limit falls with the duration of a fixed shape, to leading order."""
@@ -95,6 +99,8 @@ class _Trial:
         Its use [-].
     estimate
         Duration at which all limits would just be obeyed if peaks were powers of it [s].
+    is_sampled
+        Whether the use is that at some times only, and there beyond a limit already.
 
     """
 
@@ -103,6 +109,7 @@ class _Trial:
     worst: LimitUse | None
     ratio: float
     estimate: float
+    is_sampled: bool = False
 
     @property
     def obeys(self) -> bool:
@@ -179,12 +186,12 @@ class _Search:
         """Return the shortest trial that obeys."""
         return min((t for t in self._trials.values() if t.obeys), key=lambda t: t.duration)
 
-    def _try(self, duration: float) -> _Trial:
+    def _try(self, duration: float, *, briefly: bool = False) -> _Trial:
         """Return the trial of a duration, rounded so that its usual text is exactly it."""
         rounded = float(f'{duration:.{DIGITS}g}')
         duration = min(max(rounded, self._shortest), self._longest)
         known = self._trials.get(duration)
-        if known is not None:
+        if known is not None and (briefly or not known.is_sampled):
             return known
         try:
             plan = self._plan_of(duration)
@@ -193,7 +200,13 @@ class _Search:
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
             self._refuse_ends(plan)
-            uses = self._limits.uses(plan)
+            uses = []
+            if briefly:
+                times = plan.duration * np.linspace(0.0, 1.0, SAMPLES)
+                uses = self._limits.uses_at(plan, times)
+            is_sampled = any(use.exceeded for use in uses)
+            if not is_sampled:
+                uses = self._limits.uses(plan)
             worst = max(uses, key=lambda use: use.ratio, default=None)
             stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
             trial = _Trial(
@@ -202,6 +215,7 @@ class _Search:
                 worst=worst,
                 ratio=0.0 if worst is None else worst.ratio,
                 estimate=duration * max(stretch, default=0.0),
+                is_sampled=is_sampled,
             )
         self._trials[duration] = trial
         return trial
@@ -255,9 +269,9 @@ class _Search:
         """Try a grid of durations between two."""
         duration = high / SCAN_STEP
         while duration > low:
-            self._try(duration)
+            self._try(duration, briefly=True)
             duration /= SCAN_STEP
-        self._try(low)
+        self._try(low, briefly=True)
 
     def _refuse_ends(self, plan: Plan) -> None:
         """Refuse a motion that starts or ends with too large an effort; looked at once."""
@@ -269,7 +283,8 @@ class _Search:
 
     def _refuse_if_none(self) -> None:
         """Refuse if no trial obeys."""
-        least = min(self._trials.values(), key=lambda trial: trial.ratio)
+        while (least := min(self._trials.values(), key=lambda trial: trial.ratio)).is_sampled:
+            self._try(least.duration)
         if least.obeys:
             return
         if least.worst is not None:

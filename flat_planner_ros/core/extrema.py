@@ -3,7 +3,7 @@ Extrema of a plan between its samples: how far every joint's motion and effort g
 
 The law is cut into segments on which a Chebyshev series of fixed degree holds every quantity to
 `RESOLUTION`, whatever the quantity is made of; its extrema are then those of polynomials, and the
-values reported are those of the law itself at the times found (docs/derivation.md, section 9).
+values reported are those of the law itself at the times found (docs/derivation.md, section L).
 """
 
 from collections.abc import Sequence
@@ -89,6 +89,12 @@ class Extrema(NamedTuple):
     lowest_at: FloatArray
     highest: FloatArray
     highest_at: FloatArray
+
+    @classmethod
+    def of_samples(cls, times: FloatArray, values: FloatArray) -> 'Extrema':
+        """Return those among samples, of shape (m,) and (m, n)."""
+        low, high = values.argmin(axis=0), values.argmax(axis=0)
+        return cls(values.min(axis=0), times[low], values.max(axis=0), times[high])
 
     @property
     def peak(self) -> FloatArray:

@@ -1,5 +1,6 @@
 """Limits of joints, and what of a plan goes beyond them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -208,10 +209,18 @@ class JointLimits:
     def uses(self, plan: Plan) -> list[LimitUse]:
         """Return how far a plan goes towards each finite limit, those within included."""
         quantities = self.quantities
-        if not quantities:
-            return []
+        return self._uses(plan, extrema_of(plan, quantities)) if quantities else []
+
+    def uses_at(self, plan: Plan, times: FloatArray) -> list[LimitUse]:
+        """Return the same for some times [s] only: at most as much is used there."""
+        samples = plan.at(times)
+        found = [Extrema.of_samples(times, each.of(samples)) for each in self.quantities]
+        return self._uses(plan, found)
+
+    def _uses(self, plan: Plan, extrema: Sequence[Extrema]) -> list[LimitUse]:
+        """Return the use of each finite limit, given the extrema of the limited quantities."""
         uses: list[LimitUse] = []
-        for quantity, found in zip(quantities, extrema_of(plan, quantities), strict=True):
+        for quantity, found in zip(self.quantities, extrema, strict=True):
             if quantity is Quantity.POSITION:
                 uses += self._uses_of_position(plan, found)
             else:

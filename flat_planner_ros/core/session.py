@@ -302,12 +302,6 @@ class PlannerSession:
         limits = self._timing(origin.pose).limits
         remaining = running.end - origin.time
         planned = stop_plan(running.plan, origin.pose, origin.jets, remaining, limits)
-        if planned is None:
-            raise RequestRejected(
-                Reason.BUSY,
-                f'no stop within the limits ends sooner than the motion itself, in '
-                f'{running.end - now:.3f} s; it goes on',
-            )
         motion = Motion(
             plan_id=running.plan_id,
             plan=planned,

@@ -38,13 +38,13 @@ def stop_plan(
     jets: FloatArray | None,
     remaining: float,
     limits: JointLimits | None = None,
-) -> Plan | None:
+) -> Plan:
     """
     Return the shortest plan to rest that demands little more than the motion that it ends.
 
     Its peaks of effort and velocity stay below twice the motion's: with the same effort, a motion
-    that is optimal cannot be stopped much before its end. None if no stop keeps within the limits:
-    then the motion itself, which does, is the better one.
+    that is optimal cannot be stopped much before its end. Where no stop keeps within the limits,
+    which may have been lowered since, it takes all the time that the motion would have taken.
 
     Parameters
     ----------
@@ -67,8 +67,7 @@ def stop_plan(
         return plan(request, arm, options)
     effort = DEMAND * running.peak_effort
     velocity = DEMAND * running.peak_velocity
-    whole = _stop(running, options, pose, jets, remaining)
-    best = None if _exceeds(whole, limits) else whole
+    best = _stop(running, options, pose, jets, remaining)
     shortest, longest = SHORTEST * remaining, remaining
     for _ in range(HALVINGS):
         middle = (shortest * longest) ** 0.5

@@ -10,6 +10,7 @@ from flat_planner_ros.core.extrema import extrema_of, Quantity
 from flat_planner_ros.core.flatness import FlatModel
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
+from flat_planner_ros.core.request import ViaPoint
 import numpy as np
 from numpy.polynomial import Polynomial
 import pytest
@@ -120,6 +121,27 @@ def test_extrema_of_efforts_that_are_not_linear_in_the_law(joints, moving):
             assert (values.min(axis=0) >= found.lowest - ACCURACY * spread).all()
             assert (found.highest <= values.max(axis=0) + 1e-4 * spread).all()
             assert (found.lowest >= values.min(axis=0) - 1e-4 * spread).all()
+
+
+@pytest.mark.parametrize('kind', ['through points', 'insensitive'])
+def test_extrema_of_other_laws(paper_arm, kind):
+    options = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT)
+    via = ()
+    if kind == 'insensitive':
+        options = PlanningOptions(strategy=Strategy.INSENSITIVE)
+    else:
+        # An overshoot beyond the last point, and a reversal.
+        via = tuple(
+            ViaPoint(time=time, values=[value]) for time, value in ((0.6, 2.0), (1.0, -0.5))
+        )
+    request = MotionRequest(start=[0.0, 0.0], final=[1.0, 0.0], duration=1.9, via=via)
+    planned = plan(request, paper_arm, options)
+    samples = brute_force(planned)
+    for quantity, found in zip(Quantity, extrema_of(planned), strict=True):
+        values = quantity.of(samples)
+        spread = np.ptp(values, axis=0)
+        assert (np.abs(found.highest - values.max(axis=0)) <= ACCURACY * spread).all()
+        assert (np.abs(found.lowest - values.min(axis=0)) <= ACCURACY * spread).all()
 
 
 def test_extrema_of_the_polynomial_law_are_roots_of_polynomials(paper_arm):

@@ -1,5 +1,6 @@
 """Rules for durations: kept, refused with the numbers, stretched or found."""
 
+from dataclasses import replace
 from math import inf, pi
 
 from flat_planner_ros.core.arm import PlanarArm
@@ -220,3 +221,52 @@ def test_a_stretched_motion_stays_within_the_longest_duration(paper_arm):
 def test_limits_of_another_arm_are_refused(paper_arm):
     with pytest.raises(Exception, match='limits of 3 joints for an arm of 2'):
         session(paper_arm, limits=JointLimits.of(3))
+
+
+def test_a_goal_in_motion_obeys_the_limits_too(paper_arm):
+    limits = JointLimits.of(2, effort=[EFFORT, inf], velocity=[6.0, inf])
+    moving = session(paper_arm, limits=limits)
+    first = moving.submit(goal(time=2.0), 10.0)
+    second = moving.submit(goal(-1.0), 10.4)
+    assert second.plan.request.start_jets is not None
+    assert second.duration_min == second.plan.duration
+    times = np.linspace(0.0, second.plan.duration, 20_001)
+    assert np.abs(second.plan.at(times).efforts).max() <= EFFORT * (1.0 + 1e-9)
+    assert second.start < first.start + first.plan.duration
+    with pytest.raises(RequestRejected) as refusal:
+        moving.submit(goal(pi, 0.3), 10.6)
+    assert refusal.value.reason in (Reason.EFFORT_LIMIT, Reason.VELOCITY_LIMIT)
+    assert moving.motion is second
+
+
+def test_a_stop_obeys_the_limits(paper_arm):
+    limits = JointLimits.of(2, effort=[1.5 * peak_effort(plan_of_session(paper_arm)), inf])
+    free, limited = (session(paper_arm, limits=each) for each in (None, limits))
+    first, _ = (each.submit(goal(time=1.0), 10.0) for each in (free, limited))
+    unlimited, stop = free.stop(10.25), limited.stop(10.25)
+    assert limits.worst(unlimited.plan).exceeded  # else the case shows nothing
+    assert not limits.worst(stop.plan).exceeded
+    assert unlimited.end < stop.end <= first.end
+
+
+@pytest.mark.parametrize('elapsed', [0.0, 0.2, 0.4, 0.6, 0.8])
+def test_a_motion_at_its_limits_can_be_stopped_within_them(paper_arm, elapsed):
+    limits = JointLimits.of(2, effort=[peak_effort(plan_of_session(paper_arm)) * 1.001, inf])
+    moving = session(paper_arm, limits=limits)
+    motion = moving.submit(goal(time=1.0), 10.0)
+    stop = moving.stop(10.0 + elapsed)
+    assert not limits.worst(stop.plan).exceeded
+    assert stop.end <= motion.end
+
+
+def test_an_arm_stops_even_if_its_limits_were_lowered_in_motion(paper_arm):
+    moving = session(paper_arm)
+    motion = moving.submit(goal(time=1.0), 10.0)
+    moving.settings = replace(moving.settings, limits=JointLimits.of(2, effort=[1e-4, inf]))
+    assert moving.stop(10.3).end == pytest.approx(motion.end)
+
+
+def plan_of_session(arm):
+    """Return the half turn of 1 s that sessions here plan."""
+    request = MotionRequest(start=[0.0, 0.0], final=[pi, 0.0], duration=1.0)
+    return plan(request, arm, PlanningOptions())

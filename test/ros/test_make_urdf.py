@@ -32,7 +32,7 @@ def test_it_prints_what_it_writes(tmp_path):
     file = tmp_path / 'arm.urdf'
     printed = make_urdf(CONFIG / 'arm_2dof.yaml').stdout
     make_urdf(CONFIG / 'arm_2dof.yaml', '--output', file)
-    assert file.read_text('utf-8') == printed == read_urdf(None)
+    assert file.read_text('utf-8') == printed == read_urdf(CONFIG / 'arm_2dof.yaml')
 
 
 def test_its_options_reach_the_urdf():
