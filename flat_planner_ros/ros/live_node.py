@@ -145,8 +145,6 @@ class LiveNode(Node):
         self.executor.create_task(act())
         try:
             return await asyncio.wait_for(asyncio.wrap_future(answer), PATIENCE)
-        except TimeoutError:
-            return False, f'no answer within {PATIENCE:g} s'
         except asyncio.TimeoutError:  # noqa: UP041  Another class on Python 3.10.
             return False, f'no answer within {PATIENCE:g} s'
 
