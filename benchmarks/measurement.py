@@ -39,7 +39,7 @@ class Section(NamedTuple):
     ----------
     title, header, rows
         Its text; the first column is left-aligned.
-    notes
+    notes : Sequence[str]
         Lines below it.
 
     """

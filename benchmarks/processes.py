@@ -55,7 +55,7 @@ class NodeProcess:
         `planner`, `plant` or `monitor`.
     executor
         What spins it.
-    parameters
+    parameters : dict[str, str]
         Its parameters by name, as on the command line.
     file
         Of parameters that come before these.

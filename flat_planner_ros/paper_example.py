@@ -63,7 +63,7 @@ class Method(NamedTuple):
     ----------
     name
         As the table shows it.
-    parameters
+    parameters : Mapping[str, str]
         Of the planner, fixed ones.
     learns
         Whether the row is the second of two motions, after the estimate from the first has been

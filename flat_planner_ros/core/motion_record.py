@@ -113,7 +113,7 @@ class PlannedMotion:
 
     @cached_property
     def _motion(self) -> SampledMotion:
-        """The motion between the points."""
+        """Return the motion between the points."""
         return SampledMotion(self.times, self.positions, self.velocities)
 
 

@@ -85,7 +85,7 @@ class PlanSamples:
 
     @cached_property
     def flat(self) -> FloatArray:
-        """Derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k]."""
+        """Return derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k]."""
         flat = _derivatives(self.flat_map.output, self.planned[0], FLAT_ORDERS)[None]
         if len(self.planned) > 1:
             flat = np.concatenate([flat, self.planned[1:, :FLAT_ORDERS]])

@@ -76,7 +76,7 @@ class Plan:
 
     @property
     def cost(self) -> QuadraticCost:
-        """What was minimised."""
+        """Return what was minimised."""
         return self.task.cost
 
     @property
@@ -91,7 +91,7 @@ class Plan:
 
     @property
     def laws(self) -> tuple[Law, ...]:
-        """The planned variables over time, n - 1 of them."""
+        """Return the planned variables over time, n - 1 of them."""
         return self.course.laws
 
     def jets(self, times: FloatArray) -> FloatArray:
@@ -249,7 +249,7 @@ def _from_rest(request: MotionRequest, options: PlanningOptions, task: Task) -> 
     distances = tuple(
         [0.0 if abs(b - a) < NO_DISTANCE else b - a for a, b in zip(start, final, strict=True)]
     )
-    if not all([abs(distance) < task.reach for distance in distances]):
+    if not all(abs(distance) < task.reach for distance in distances):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
     course: Course = RestToRest(task=task, start=start, final=final, distances=distances)
     moves = any(distances)

@@ -84,7 +84,7 @@ class Row:
     infinite: bool = False
 
     @property
-    def type(self) -> Parameter.Type:
+    def type(self) -> Parameter.Type:  # noqa: A003
         """Return the type of its value."""
         if isinstance(self.default, Parameter.Type):
             return self.default

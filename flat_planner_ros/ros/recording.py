@@ -155,7 +155,7 @@ class Recording:
     ----------
     topics
         Types of the topics by name.
-    parameters
+    parameters : list[tuple]
         Parameters of nodes: time [ns since 1970], name with namespace, JSON text of the values.
     damage
         Where and why reading ends early, empty for a complete recording.

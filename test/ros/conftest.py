@@ -162,7 +162,7 @@ class Graph:
         ----------
         node_class
             Its class.
-        parameters
+        parameters : Mapping[str, Any]
             Values by name, as if from a parameter file.
         arguments
             What would follow `--ros-args`, e.g. '-r', 'joint_states:=other'.

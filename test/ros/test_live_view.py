@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 
 aiohttp = pytest.importorskip('aiohttp')
 
-from flat_planner_ros import live  # noqa: E402  It needs what is asked for above.
+from flat_planner_ros import live  # noqa: E402, I100  It needs what is asked for above.
 from flat_planner_ros.live.server import MAX_BROWSERS, RATE  # noqa: E402
 from flat_planner_ros.ros import live_node  # noqa: E402
 

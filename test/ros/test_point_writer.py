@@ -1,12 +1,9 @@
 """Serialised trajectories against those that the middleware makes of messages."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from flat_planner_ros.ros.conversions import duration_msg, time_msg
 from flat_planner_ros.ros.point_writer import trajectory_bytes
 import numpy as np
+import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 

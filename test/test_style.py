@@ -1,0 +1,155 @@
+"""ROS's own linters, where they are installed, and what they cannot tell."""
+
+from configparser import ConfigParser
+import os
+from pathlib import Path
+import re
+import shutil
+import subprocess
+from xml.etree import ElementTree
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+CONFIGURATION = Path(__file__).with_name('flake8.ini')
+FOLDERS = ('benchmarks', 'docs', 'examples', 'flat_planner_ros', 'launch', 'test')
+FILES = [
+    CHECKOUT / 'setup.py',
+    *(path for folder in FOLDERS for path in sorted((CHECKOUT / folder).rglob('*.py'))),
+]
+FORMAT_3 = {
+    'name',
+    'version',
+    'description',
+    'maintainer',
+    'license',
+    'url',
+    'author',
+    'depend',
+    'exec_depend',
+    'test_depend',
+    'doc_depend',
+    'export',
+}
+"""What an ament_python package may say of itself by REP 149."""
+
+IN_ORDER = ('name', 'version', 'description', 'maintainer', 'license')
+"""What comes first, in the order of REP 149; the rest in groups."""
+
+ROSDEP_KEYS = {
+    'python3-hypothesis',
+    'python3-matplotlib',
+    'python3-mypy',
+    'python3-numpy',
+    'python3-pytest',
+    'python3-pytest-timeout',
+    'python3-pytest-xdist',
+    'python3-scipy',
+    'python3-yaml',
+}
+"""Keys of rosdistro's rosdep/python.yaml that have a package on Ubuntu 24.04."""
+
+ROS_PACKAGES = {
+    'ament_copyright',
+    'ament_flake8',
+    'ament_index_python',
+    'ament_pep257',
+    'ament_xmllint',
+    'builtin_interfaces',
+    'diagnostic_msgs',
+    'launch',
+    'launch_ros',
+    'rcl_interfaces',
+    'rclpy',
+    'rosgraph_msgs',
+    'sensor_msgs',
+    'std_msgs',
+    'std_srvs',
+    'trajectory_msgs',
+    'visualization_msgs',
+}
+"""Packages that are released into ROS 2 Jazzy."""
+
+
+@pytest.fixture
+def checkout(monkeypatch):
+    """Return to the checkout, where linters look for files, and do not look at builds."""
+    monkeypatch.chdir(CHECKOUT)
+
+
+def test_flake8_as_ros_has_it(checkout):
+    linter = pytest.importorskip('ament_flake8.main')
+    failed, errors = linter.main_with_errors(
+        ['--config', str(CONFIGURATION), *FOLDERS, 'setup.py']
+    )
+    assert not failed, '\n'.join(errors)
+
+
+def test_pep257_as_ros_has_it(checkout):
+    linter = pytest.importorskip('ament_pep257.main')
+    assert linter.main([*FOLDERS, 'setup.py']) == 0
+
+
+def test_copyright_as_ros_has_it(checkout):
+    linter = pytest.importorskip('ament_copyright.main')
+    assert linter.main([*FOLDERS, 'setup.py']) == 0
+
+
+def test_the_configuration_is_that_of_ros_but_for_slices():
+    package = pytest.importorskip('ament_flake8')
+    theirs, ours = ConfigParser(), ConfigParser()
+    theirs.read(Path(package.__file__).parent / 'configuration' / 'ament_flake8.ini')
+    ours.read(CONFIGURATION)
+    mine, its = dict(ours['flake8']), dict(theirs['flake8'])
+    mine['extend-ignore'] = mine['extend-ignore'].removesuffix(',E203')
+    assert mine == its
+
+
+def test_xml_is_well_formed_and_valid():
+    path = CHECKOUT / 'package.xml'
+    root = ElementTree.parse(path).getroot()
+    assert root.tag == 'package'
+    assert root.get('format') == '3'
+    program = shutil.which('xmllint')
+    if program:
+        # The schema itself may be out of reach: form only.
+        subprocess.run([program, '--noout', str(path)], check=True, env={**os.environ})
+
+
+def test_the_manifest_follows_rep_149():
+    root = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+    tags = [child.tag for child in root]
+    assert set(tags) <= FORMAT_3
+    assert tuple(tags[: len(IN_ORDER)]) == IN_ORDER
+    assert re.fullmatch(r'[a-z]([a-z0-9_]*[a-z0-9])?', root.findtext('name'))
+    assert re.fullmatch(r'\d+\.\d+\.\d+', root.findtext('version'))
+    assert (CHECKOUT / root.find('license').get('file')).is_file()
+    assert root.find('maintainer').get('email')
+    assert root.findtext('export/build_type') == 'ament_python'
+
+
+def test_every_dependency_is_a_key_of_rosdep_or_a_package_of_the_distribution():
+    root = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+    keys = [child.text for child in root if child.tag.endswith('depend')]
+    assert len(keys) == len(set(keys))
+    assert set(keys) <= ROSDEP_KEYS | ROS_PACKAGES
+    for tag in ('exec_depend', 'test_depend'):
+        listed = [child.text for child in root.iter(tag)]
+        assert listed == sorted(listed)
+
+
+def test_the_changelog_follows_rep_132():
+    lines = (CHECKOUT / 'CHANGELOG.rst').read_text('utf-8').splitlines()
+    title = 'Changelog for package flat_planner_ros'
+    assert lines[:3] == ['^' * len(title), title, '^' * len(title)]
+    heads = [i for i, line in enumerate(lines) if set(line) == {'-'}]
+    assert heads
+    for i in heads:
+        assert re.fullmatch(r'Forthcoming|\d+\.\d+\.\d+ \(\d{4}-\d{2}-\d{2}\)', lines[i - 1])
+        assert len(lines[i]) == len(lines[i - 1])
+    released = re.findall(r'^(\d+\.\d+\.\d+) \(', '\n'.join(lines), re.MULTILINE)
+    root = ElementTree.parse(CHECKOUT / 'package.xml').getroot()
+    # Until the first release there is Forthcoming alone.
+    assert not released or released[0] == root.findtext('version')
+    body = [line for line in lines[heads[0] + 1 :] if line]
+    assert all(line.startswith(('* ', '  ')) for line in body)
