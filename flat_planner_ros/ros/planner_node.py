@@ -50,8 +50,8 @@ class PlannerNode(Node):
         self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
         self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.LATCHED_HISTORY)
         listen = self.create_subscription
-        listen(JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.RELIABLE)
-        listen(JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.RELIABLE)
+        listen(JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.BURST)
+        listen(JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.BURST)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
         report = interfaces.of(interfaces.MONITOR, interfaces.REPORT)
         listen(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
