@@ -12,6 +12,7 @@ setup(
     maintainer_email='flat-planner-ros@users.noreply.github.com',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
+    package_data={package_name: ['live/page/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -36,6 +37,7 @@ setup(
             'ros-jazzy-trajectory-msgs==5.3.6',
         ],
         'record': ['mcap>=1.6,<2', 'rosbags>=0.10,<0.12', 'zstandard>=0.22,<1'],
+        'live': ['aiohttp>=3.9,<4'],
         'plot': ['matplotlib>=3.6,<4'],
         # What benchmarks/ compares with; each may be missing.
         'bench': [
@@ -46,6 +48,8 @@ setup(
         ],
         # Second opinions on the URDF; tests that want one of them are skipped without it.
         'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],
+        # The live view in a real browser, Chromium; skipped without.
+        'browser': ['playwright>=1.49,<2'],
         'docs': [
             'furo>=2024.1',
             'myst-parser>=3,<6',
@@ -53,6 +57,7 @@ setup(
             'sphinx>=7.2,<9',
         ],
         'test': [
+            'aiohttp>=3.9,<4',
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
             'mcap>=1.6,<2',
@@ -73,8 +78,9 @@ setup(
             'planner_node = flat_planner_ros.programs:planner_node',
             'plant_node = flat_planner_ros.programs:plant_node',
             'monitor_node = flat_planner_ros.programs:monitor_node',
-            'record = flat_planner_ros.ros.record:main',
+            'record = flat_planner_ros.programs:record',
             'analyse = flat_planner_ros.ros.analyse:main',
+            'live_view = flat_planner_ros.programs:live_view',
             'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.ros.make_urdf:main',
             'flat_plan = flat_planner_ros.ros.flat_plan:main',

@@ -34,6 +34,16 @@ def demo() -> int:
     return _run('demo')
 
 
+def record() -> int:
+    """Record the graph."""
+    return _run('record')
+
+
+def live_view() -> int:
+    """Show the graph in web browsers."""
+    return _run('live_view')
+
+
 def _run(module: str) -> int:
     """Load a module of the ROS layer and run its `main`; return the exit code."""
     for number in SIGNALS:

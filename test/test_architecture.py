@@ -286,14 +286,19 @@ def test_test_dependencies_agree():
     }
     declared = {name.removeprefix('python3-') for name in manifest('test_depend')}
     only_pip = {'mpmath', 'mypy', 'pytest-timeout', 'pytest-xdist', 'ruff'}
-    only_pip |= {'mcap', 'mcap-ros2-support', 'rosbags', 'zstandard'}
+    only_pip |= {'aiohttp', 'mcap', 'mcap-ros2-support', 'rosbags', 'zstandard'}
     assert declared | only_pip == extra
 
 
 def test_what_is_imported_is_declared():
     declared = manifest('exec_depend') | {'numpy', 'scipy', 'matplotlib', 'flat_planner_ros'}
     declared |= {'rcl_interfaces', 'yaml'}  # what rclpy itself brings along
-    declared |= distributions(setup_arguments()['extras_require']['record'])
+    declared |= set().union(
+        *(
+            distributions(setup_arguments()['extras_require'][extra])
+            for extra in ('record', 'live')
+        )
+    )
     used = set().union(*map(roots, [*PACKAGE.rglob('*.py'), *CHECKOUT.glob('launch/*.py')]))
     assert used - sys.stdlib_module_names <= declared
 

@@ -22,6 +22,9 @@ ORDER = 6
 WEIGHT_EXPONENT = 8
 """The paper raises r and p to this power, so that useful weights stay below 1000."""
 
+MAX_FACTOR = 1e100
+"""Largest factor of a derivative in a cost; its square and sums of squares still have room."""
+
 MAX_WEIGHT = 1000.0
 """Largest r or p accepted: beyond, weight**8 times the arm's data may leave double precision."""
 
@@ -141,9 +144,14 @@ def strategy_cost(
     matrix = np.zeros((ORDER, ORDER))
     if strategy in (Strategy.MIN_CONTROL_EFFORT, Strategy.MIXED):
         effort = flat_map.effort[1:]
-        matrix[: len(effort), : len(effort)] = r**WEIGHT_EXPONENT * np.multiply.outer(
-            effort, effort
-        )
+        weighted = r ** (WEIGHT_EXPONENT // 2) * effort
+        largest = float(np.abs(weighted).max())
+        if not largest < MAX_FACTOR:
+            raise InvalidCost(
+                f'effort weighted with r = {r:g} is up to {largest:.3g}, beyond {MAX_FACTOR:g}: '
+                f'the model has numbers that no arm has'
+            )
+        matrix[: len(effort), : len(effort)] = np.multiply.outer(weighted, weighted)
     if strategy in (Strategy.MIN_POTENTIAL_ENERGY, Strategy.MIXED):
         matrix[1, 1] += p**WEIGHT_EXPONENT
     matrix[-1, -1] = 1.0

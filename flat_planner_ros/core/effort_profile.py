@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from flat_planner_ros.core.errors import InvalidCommand
-from flat_planner_ros.core.interpolation import interpolate_motion
+from flat_planner_ros.core.interpolation import SampledMotion
 import numpy as np
 import numpy.typing as npt
 
@@ -151,13 +151,10 @@ class EffortProfile:
         without velocities are joined linearly.
         """
         effort = self.effort(t)
-        if self.positions is None:
+        if self._motion is None:
             missing = np.full(self.motors, np.nan)
             return JointReference(effort, missing, missing)
-        elapsed = t - self.start
-        return JointReference(
-            effort, *interpolate_motion(self.times, self.positions, self.velocities, elapsed)
-        )
+        return JointReference(effort, *self._motion.at(t - self.start))
 
     def _lock_optional(
         self, name: str, value: npt.ArrayLike | None, shape: tuple[int, ...], unit: str
@@ -174,6 +171,13 @@ class EffortProfile:
     def _before(self) -> Array:
         """Effort before the first knot."""
         return np.zeros(self.motors) if self.anchor_effort is None else self.anchor_effort
+
+    @cached_property
+    def _motion(self) -> SampledMotion | None:
+        """Where the arm should be, if that is commanded."""
+        if self.positions is None:
+            return None
+        return SampledMotion(self.times, self.positions, self.velocities)
 
     @cached_property
     def _course(self) -> _Course:

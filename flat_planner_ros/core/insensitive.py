@@ -4,7 +4,7 @@ The strategy `insensitive`: effort against the residual on arms other than the m
 In the basis of `momentum` effort is a plain sum of squares and every residual amplitude the
 magnitude of one complex number, linear in the coefficients. A quadratic compromise is therefore
 one small linear system, and the largest residual over a box is reached by reweighting a few dozen
-points of its boundary (docs/derivation.md, section 9).
+points of its boundary (docs/derivation.md, section I).
 """
 
 from collections.abc import Callable
@@ -114,7 +114,7 @@ class ShapedMotion:
 
 
 def least_effort(arm: PlanarArm, distance: float, duration: float) -> float:
-    """Return the least RMS effort of joint n-1 of any motion from rest to rest [N m], (51)."""
+    """Return the least RMS effort of joint n-1 of any motion from rest to rest [N m], (I5)."""
     return sqrt(12.0) * arm.inertia_star.both * abs(distance) / duration**2
 
 
@@ -371,7 +371,7 @@ def _residual_rows(
     """
     Return the residual that each Legendre term of sigma'' leaves per rad, shape (p, terms).
 
-    The integral of P_j(x) exp(z (1 - x)) is a modified spherical Bessel function of z ((56) of
+    The integral of P_j(x) exp(z (1 - x)) is a modified spherical Bessel function of z ((I9) of
     docs/derivation.md), here with its growth taken out.
     """
     # Imported here: it takes longer than planning with any other strategy.

@@ -2,7 +2,7 @@
 Momentum angle: laws of the planned variable that are shaped by their effort.
 
 The momentum angle sigma is the angle that the last two links would have if they were one rigid
-body: I*_(n-1) sigma'' = tau, whatever the spring does ((52) of docs/derivation.md). Any torque is
+body: I*_(n-1) sigma'' = tau, whatever the spring does ((I4) of docs/derivation.md). Any torque is
 therefore a sigma, expanded here in Legendre polynomials, and the planned variable w answers to it
 like an oscillator: w + delta w' + w'' / omega^2 = sigma.
 """
@@ -212,7 +212,7 @@ def answer(
 
     References
     ----------
-    (53) to (55) of docs/derivation.md.
+    (I6) and (I10) of docs/derivation.md.
 
     """
     half = 0.5 * duration

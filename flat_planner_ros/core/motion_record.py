@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.interpolation import interpolate_motion
+from flat_planner_ros.core.interpolation import SampledMotion
 import numpy as np
 from numpy.typing import NDArray
 
@@ -108,7 +109,12 @@ class PlannedMotion:
             interpolation if velocities are planned, else by linear interpolation.
 
         """
-        return interpolate_motion(self.times, self.positions, self.velocities, time - self.start)
+        return self._motion.at(time - self.start)
+
+    @cached_property
+    def _motion(self) -> SampledMotion:
+        """The motion between the points."""
+        return SampledMotion(self.times, self.positions, self.velocities)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)

@@ -3,7 +3,7 @@ Robustness: the oscillation that an effort leaves on an arm other than the plann
 
 The residual amplitude is one integral of the effort against the arm's free oscillation ((44) of
 docs/derivation.md), so it is known before anything moves, for any stiffness and damping. Over a
-box of stiffness and damping its largest value lies on the boundary (section 9.1).
+box of stiffness and damping its largest value lies on the boundary (docs/derivation.md, I.1).
 """
 
 from collections.abc import Sequence
@@ -217,7 +217,7 @@ def residual_amplitude(
 
     References
     ----------
-    (50) of docs/derivation.md: exact for efforts that are linear between the samples.
+    (I3) of docs/derivation.md: exact for efforts that are linear between the samples.
 
     """
     step = duration / (len(effort) - 1)

@@ -7,6 +7,9 @@ from flat_planner_ros.core.errors import InvalidModel
 from flat_planner_ros.core.simulation import ArmState
 import numpy as np
 
+FINEST = 1e-12
+"""Finest step of an encoder; below, the number of steps in an angle means nothing [rad]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sensing:
@@ -34,6 +37,10 @@ class Sensing:
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0.0):
                 raise InvalidModel(f'{name} must be finite and at least 0 rad, got {value}')
+        if 0.0 < self.resolution < FINEST:
+            raise InvalidModel(
+                f'resolution must be 0 or at least {FINEST:g} rad, got {self.resolution} rad'
+            )
         if self.seed < 0:
             raise InvalidModel(f'seed must be at least 0, got {self.seed}')
 

@@ -3,7 +3,7 @@ Input shaping: what a rigid-arm motion convolved with impulses does, as a baseli
 
 A quintic for the arm without its spring is split into two or three copies, a half-period of the
 nominal oscillation apart, so that their oscillations cancel on the nominal arm (Singer and Seering
-1990; section 9.6 of docs/derivation.md).
+1990; docs/derivation.md, I.6).
 """
 
 from enum import Enum
@@ -61,7 +61,7 @@ def shaped_quintic(
 
     References
     ----------
-    (68) of docs/derivation.md.
+    (I14) of docs/derivation.md.
 
     """
     mode = arm.natural_mode()

@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Sequence
+from typing import TypeVar
 
 from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.core import (
@@ -15,6 +16,8 @@ from flat_planner_ros.core import (
     JointSample,
     PlannedMotion,
     PlanSamples,
+    Reason,
+    RequestRejected,
     Residual,
     select,
     Track,
@@ -22,11 +25,17 @@ from flat_planner_ros.core import (
 from flat_planner_ros.ros.point_writer import NANOSECONDS, trajectory_bytes
 import numpy as np
 from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory
 
 FloatArray = NDArray[np.float64]
+
+Message = TypeVar('Message')
+
+MAX_GOAL_BYTES = 100_000
+"""Longest goal that is read; 51 points of seven joints take a tenth of it."""
 
 
 def seconds(time: Time | Duration) -> float:
@@ -44,6 +53,29 @@ def duration_msg(duration: float) -> Duration:
     """Return the message of a duration [s]."""
     sec, nanosec = divmod(round(duration * NANOSECONDS), NANOSECONDS)
     return Duration(sec=sec, nanosec=nanosec)
+
+
+def message_of(data: bytes, message_type: type[Message]) -> Message:
+    """
+    Return a serialised goal as a message.
+
+    A message with a hundred thousand points takes seconds to become Python objects; its length
+    tells beforehand that it is no goal.
+
+    Raises
+    ------
+    RequestRejected
+        It is longer than any goal may be.
+
+    """
+    if len(data) > MAX_GOAL_BYTES:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal is {len(data)} bytes long, more than {MAX_GOAL_BYTES}',
+            value=float(len(data)),
+            limit=float(MAX_GOAL_BYTES),
+        )
+    return deserialize_message(data, message_type)
 
 
 def goal_from_trajectory(msg: JointTrajectory) -> Goal:

@@ -65,7 +65,7 @@ Where ours and the paper's differ, and why (docs/paper_errata.md):
 
 
 BEYOND_REMARKS = """
-Beyond the paper (docs/derivation.md, sections 3, 8.1 and 9); scenario 4 is scenario 3 with -10 %:
+Beyond the paper (docs/derivation.md, sections 3, 8.1 and I); scenario 4 is scenario 3 with -10 %:
 - exact: min_control_effort on the exact flat map. Damping leaves nothing, a mismatch what it must.
 - insensitive: exact too, and small over all stiffness and damping within 10 %, for more effort.
 - self-tuned: the second of two exact motions, planned with the stiffness and damping that the

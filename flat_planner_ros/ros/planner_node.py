@@ -50,8 +50,12 @@ class PlannerNode(Node):
         self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
         self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.LATCHED_HISTORY)
         listen = self.create_subscription
-        listen(JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.BURST)
-        listen(JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.BURST)
+        # As bytes: a message that is too long is refused before it takes seconds to be read.
+        for kind, topic, heard in (
+            (JointTrajectory, interfaces.GOAL, self._on_goal),
+            (JointState, interfaces.GOAL_STATE, self._on_goal_state),
+        ):
+            listen(kind, topic, heard, interfaces.BURST, raw=True)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
         report = interfaces.of(interfaces.MONITOR, interfaces.REPORT)
         listen(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
@@ -87,13 +91,15 @@ class PlannerNode(Node):
         self._session.settings = settings.session
         self._efforts.configure(settings.stream_effort, settings.session.period)
 
-    def _on_goal(self, msg: JointTrajectory) -> None:
+    def _on_goal(self, data: bytes) -> None:
         """Answer a goal given as a trajectory."""
-        self._answer(lambda: conversions.goal_from_trajectory(msg))
+        read = conversions.message_of
+        self._answer(lambda: conversions.goal_from_trajectory(read(data, JointTrajectory)))
 
-    def _on_goal_state(self, msg: JointState) -> None:
+    def _on_goal_state(self, data: bytes) -> None:
         """Answer a goal given as a pose."""
-        self._answer(lambda: conversions.goal_from_joint_state(msg))
+        read = conversions.message_of
+        self._answer(lambda: conversions.goal_from_joint_state(read(data, JointState)))
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""

@@ -31,7 +31,7 @@ class PlantNode(Node):
     def __init__(self, **options: object) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.PLANT, **options)
-        self._declared = NodeParameters(self, ROWS, build, self._apply)
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
         settings = self._settings
         if settings.publish_clock and self.get_parameter('use_sim_time').value:
             raise InvalidParameter(
@@ -55,7 +55,7 @@ class PlantNode(Node):
     @property
     def _settings(self) -> PlantSettings:
         """Return the settings in force."""
-        return self._declared.settings
+        return self._configuration.settings
 
     def _listen(self) -> None:
         """Subscribe to what moves the arm."""

@@ -205,13 +205,13 @@ class RecorderNode(Node):
         client = self._parameter_clients[node]
         names = list((await client.list_parameters()).result.names)
         types = (await client.get_parameter_types(names)).types
-        # One name without a value would make the node answer nothing at all.
-        names = [n for n, kind in zip(names, types, strict=True) if kind != NOT_SET]
+        # One name without a value would make the node answer nothing at all, as may its end.
+        names = [n for n, kind in zip(names, types, strict=False) if kind != NOT_SET]
         values = map(parameter_value_to_python, (await client.get_parameters(names)).values)
         record = {
             'node': f'{self.get_namespace().rstrip("/")}/{node}',
             'time': str(time_ns()),
-            'values': json.dumps({n: _plain(v) for n, v in zip(names, values, strict=True)}),
+            'values': json.dumps({n: _plain(v) for n, v in zip(names, values, strict=False)}),
         }
         self._guarded(lambda: self._writer.note(PARAMETERS, record))
 

@@ -17,16 +17,15 @@ from flat_planner_ros.ros import conversions, monitor_parameters
 from flat_planner_ros.ros.interfaces import JOINT_STATES, MONITOR, of, PLAN, PLANNER
 from flat_planner_ros.ros.message_types import message_class
 from flat_planner_ros.ros.recording import Entry, Recording
-from flat_planner_ros.ros.stamp_clock import StampClock
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 
-TICK_PERIOD = 0.1
-"""Time between two looks for silence, as in the monitor node [s]."""
-
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+
+SILENCE = 1.001
+"""Time after the last sample of a recording, relative to what counts as silence [-]."""
 
 SHOWN_BEFORE = 0.1
 """Time before a motion of which samples are kept, relative to the motion [-]."""
@@ -135,36 +134,34 @@ def replay(
 
 
 class _Player:
-    """Feeds a monitor as its node does."""
+    """
+    Feeds a monitor as its node does, but for the time: that comes with the stamps alone.
+
+    A recorder may have been late where the joint states were not.
+    """
 
     def __init__(self, settings: MonitorSettings) -> None:
         """Wait for a plan."""
         self.monitor = VibrationMonitor(settings)
         self.judgements: list[Judgement] = []
-        self._clock = StampClock()
+        self._stamp: float | None = None
         self._reader: conversions.JointStateReader | None = None
         self._motions: list[PlannedMotion] = []
         self._samples: list[JointSample] = []
-        self._arrival = self._ticked = 0.0
 
     def take(self, entry: Entry) -> None:
         """Take a message; one that cannot be used is left out, as in the node."""
-        self._arrival = entry.time / conversions.NANOSECONDS
-        if self._arrival >= self._ticked + TICK_PERIOD:
-            self._ticked = self._arrival
-            if self._clock.stamp is not None:
-                self._keep(self.monitor.tick(self._clock.now(self._arrival)))
         msg = deserialize_message(entry.message, message_class(entry.kind))
         if not conversions.is_stamped(msg):
-            msg.header.stamp = conversions.time_msg(self._arrival)
+            msg.header.stamp = conversions.time_msg(entry.time / conversions.NANOSECONDS)
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
         _unless_refused(take, msg)
 
     def end(self) -> None:
         """Judge a motion that is still watched: nothing more will come."""
-        if self._clock.stamp is not None:
-            silence = self.monitor.settings.timeout + TICK_PERIOD
-            self._keep(self.monitor.tick(self._clock.stamp + silence))
+        if self._stamp is not None:
+            silence = SILENCE * self.monitor.settings.timeout
+            self._keep(self.monitor.tick(self._stamp + silence))
 
     def _take_plan(self, msg: Any) -> None:
         """Take a plan, for whatever joints it names."""
@@ -181,7 +178,7 @@ class _Player:
         if self._reader is None:
             return
         sample = self._reader.read(msg)
-        self._clock.stamp = sample.time
+        self._stamp = sample.time
         self._samples.append(sample)
         self._keep(self.monitor.add(sample))
 

@@ -1,7 +1,7 @@
 """The monitor gives one true report per motion, whatever the samples and plans do."""
 
 from dataclasses import replace
-from time import perf_counter
+from time import process_time
 
 from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.motion_record import (
@@ -501,10 +501,10 @@ def test_adding_a_sample_is_cheap():
     samples = [sample(10.0 + 1e-3 * i, motion) for i in range(5000)]
     costs = []
     for chunk in range(0, len(samples), 500):
-        begin = perf_counter()
+        begin = process_time()
         for now in samples[chunk : chunk + 500]:
             monitor.add(now)
-        costs.append((perf_counter() - begin) / 500)
+        costs.append((process_time() - begin) / 500)
     # Ten times the 3 microseconds of a quiet machine.
     assert min(costs) < 30e-6
 

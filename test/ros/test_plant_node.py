@@ -1,6 +1,7 @@
 """The plant node on a real graph: true dynamics, commands by time, a time of its own if asked."""
 
 from math import inf, nan
+from pathlib import Path
 import signal
 from time import monotonic
 
@@ -422,6 +423,45 @@ def test_feedback_holds_what_friction_would_stop(graph):
         graph.remove(plant.node)
     assert ends[0] == 0.0
     assert ends[1] == pytest.approx(0.2, abs=0.02)
+
+
+@pytest.mark.parametrize('n', [3, 4])
+def test_arms_of_more_joints_have_friction_mismatch_and_feedback(graph, n):
+    file = Path(__file__).resolve().parents[2] / 'config' / f'arm_{n}dof.yaml'
+    friction, gains = [0.02] * (n - 1), {'feedback.p': [80.0] * (n - 1)}
+    changes = {
+        'friction.viscous': friction,
+        'friction.coulomb': [0.01] * (n - 1),
+        'mismatch.stiffness_scale': 1.2,
+        'mismatch.inertia_scale': 1.05,
+        'feedback.d': [4.0] * (n - 1),
+    }
+    plant = Plant(
+        graph, {**QUICK, 'real_time_factor': 2.0, **changes, **gains}, '--params-file', str(file)
+    )
+    settings = plant.node._arm.settings
+    nominal = settings.arm.scaled(stiffness=1 / 1.2, inertia=1 / 1.05)
+    assert settings.arm.viscous_friction == pytest.approx(friction)
+    begin, start = np.array(settings.position), plant.ahead()
+    message = JointTrajectory(joint_names=plant.states[0].name)
+    message.header.stamp = conversions.time_msg(start)
+    turn = 0.3 * np.eye(n)[0]
+    for s in np.linspace(0.0, 1.0, 51):
+        position = begin + turn * s**2 * (3 - 2 * s)
+        effort = np.append(nominal.gravity_effort(position)[:-1], 0.0)
+        velocity = turn * 6 * s * (1 - s)
+        message.points.append(
+            point(s, effort, positions=position.tolist(), velocities=velocity.tolist())
+        )
+    if not nominal.has_weight:
+        message.points[-1].effort = [0.0] * n
+    graph.publish(COMMAND, message)
+    plant.wait_until(start + 2.5)
+    positions = plant.table('position')
+    assert np.isfinite(positions).all()
+    assert positions[-1][: n - 1] == pytest.approx((begin + turn)[: n - 1], abs=0.02)
+    assert np.array_equal(positions[plant.times < start], [begin] * (plant.times < start).sum())
+    assert not graph.logged('ignored')
 
 
 def test_efforts_move_it_instead_of_trajectories(graph):

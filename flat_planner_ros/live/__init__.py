@@ -1,0 +1,1 @@
+"""The live view's web server and page; free of ROS."""

@@ -1,0 +1,115 @@
+"""What browsers are to be told: the newest values and a bounded past, safe between threads."""
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from math import isfinite
+from threading import Lock
+from typing import Any
+
+HISTORY = 3000
+"""Rows of a stream that are kept, 30 s at 100 Hz [-]."""
+
+DIGITS = 7
+"""Significant digits of a number on the page; times count from a near origin [-]."""
+
+
+@dataclass
+class Cursor:
+    """What one browser has been told: the run of the streams, rows of each, values by version."""
+
+    run: int = -1
+    rows: dict[str, int] = field(default_factory=dict)
+    versions: dict[str, int] = field(default_factory=dict)
+
+
+class Feed:
+    """
+    Values that replace each other, and streams of rows that scroll.
+
+    Parameters
+    ----------
+    streams
+        Their names.
+
+    """
+
+    def __init__(self, streams: Iterable[str]) -> None:
+        """Start with nothing to tell."""
+        self._lock = Lock()
+        self._run = 0
+        self._values: dict[str, tuple[int, Any]] = {}
+        self._streams = {name: _Stream() for name in streams}
+
+    def put(self, name: str, value: Any) -> None:
+        """Replace a value, which is JSON; nothing is told if it is the same."""
+        with self._lock:
+            version, former = self._values.get(name, (0, None))
+            if version == 0 or value != former:
+                self._values[name] = version + 1, value
+
+    def append(self, stream: str, row: Sequence[float]) -> None:
+        """Add a row to a stream; undefined numbers become null."""
+        numbers = [float(f'{x:.{DIGITS}g}') if isfinite(x) else None for x in row]
+        with self._lock:
+            self._streams[stream].append(numbers)
+
+    def restart(self) -> None:
+        """Forget all streams: another arm, or another time."""
+        with self._lock:
+            self._run += 1
+            for stream in self._streams.values():
+                stream.rows.clear()
+
+    def news(self, cursor: Cursor) -> dict[str, Any] | None:
+        """
+        Return what a browser does not know yet, and note in its cursor that it does.
+
+        Returns
+        -------
+        dict or None
+            ``values`` by name, new rows of ``streams`` by name, and ``restart`` if all former
+            rows are void; None without news.
+
+        """
+        with self._lock:
+            news: dict[str, Any] = {}
+            if cursor.run != self._run:
+                cursor.run, cursor.rows = self._run, {}
+                news['restart'] = True
+            values = {}
+            for name, (version, value) in self._values.items():
+                if cursor.versions.get(name) != version:
+                    cursor.versions[name] = version
+                    values[name] = value
+            if values:
+                news['values'] = values
+            streams = {}
+            for name, stream in self._streams.items():
+                rows = stream.after(cursor.rows.get(name, 0))
+                cursor.rows[name] = stream.count
+                if rows:
+                    streams[name] = rows
+            if streams:
+                news['streams'] = streams
+            return news or None
+
+
+class _Stream:
+    """The newest rows and the number of all that there were."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.rows: deque[list[float | None]] = deque(maxlen=HISTORY)
+        self.count = 0
+
+    def append(self, row: list[float | None]) -> None:
+        """Add a row, forgetting the oldest."""
+        self.rows.append(row)
+        self.count += 1
+
+    def after(self, count: int) -> list[list[float | None]]:
+        """Return the rows that came after the first `count`, as far as they are kept."""
+        new = min(self.count - count, len(self.rows))
+        return list(islice(self.rows, len(self.rows) - new, None)) if new > 0 else []

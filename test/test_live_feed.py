@@ -1,0 +1,56 @@
+"""What browsers are told: everything once, bounded, and as JSON."""
+
+import json
+from math import inf, nan
+
+from flat_planner_ros.live.feed import Cursor, Feed, HISTORY
+
+
+def test_each_browser_is_told_everything_once():
+    feed = Feed(['a'])
+    first, second = Cursor(), Cursor()
+    feed.put('x', {'y': 1})
+    feed.append('a', [0.0, 1.0])
+    news = {'restart': True, 'values': {'x': {'y': 1}}, 'streams': {'a': [[0.0, 1.0]]}}
+    assert feed.news(first) == news
+    assert feed.news(first) is None
+    feed.append('a', [1.0, 2.0])
+    assert feed.news(first) == {'streams': {'a': [[1.0, 2.0]]}}
+    assert feed.news(second)['streams'] == {'a': [[0.0, 1.0], [1.0, 2.0]]}
+
+
+def test_a_value_is_told_again_when_it_has_changed():
+    feed, cursor = Feed([]), Cursor()
+    feed.put('x', None)
+    assert feed.news(cursor)['values'] == {'x': None}
+    feed.put('x', None)
+    assert feed.news(cursor) is None
+    feed.put('x', [1])
+    assert feed.news(cursor) == {'values': {'x': [1]}}
+
+
+def test_the_past_is_bounded_and_a_slow_browser_gets_what_is_left_of_it():
+    feed, cursor = Feed(['a']), Cursor()
+    feed.append('a', [0.0])
+    feed.news(cursor)
+    for k in range(3 * HISTORY):
+        feed.append('a', [k])
+    rows = feed.news(cursor)['streams']['a']
+    assert len(rows) == HISTORY
+    assert rows[-1] == [3 * HISTORY - 1]
+
+
+def test_a_restart_voids_what_was_told():
+    feed, cursor = Feed(['a']), Cursor()
+    feed.append('a', [5.0])
+    feed.news(cursor)
+    feed.restart()
+    feed.append('a', [0.0])
+    assert feed.news(cursor) == {'restart': True, 'streams': {'a': [[0.0]]}}
+
+
+def test_undefined_numbers_are_json():
+    feed = Feed(['a'])
+    feed.append('a', [nan, inf, 1 / 3])
+    text = json.dumps(feed.news(Cursor()), allow_nan=False)
+    assert json.loads(text)['streams']['a'] == [[None, None, 0.3333333]]
