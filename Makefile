@@ -4,6 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
+# What is installed without ROS, pinned and hashed; "make LOCK=" takes the ranges of setup.py instead.
+LOCK ?= requirements.lock
+PIP = $(BIN)/python -m pip install --quiet --progress-bar off
+SETUPTOOLS := 'setuptools>=70.1,<80'
+comma := ,
+
 # With ROS sourced, its rclpy is used; otherwise the extra "jazzy" brings the client library.
 ROS := $(if $(ROS_DISTRO),$(shell python3 -c 'import rclpy' 2>/dev/null && echo $(ROS_DISTRO)))
 
@@ -28,7 +34,7 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test fuzz bench docs examples lint install clean FORCE
+.PHONY: help demo test fuzz bench docs examples lint install lock clean FORCE
 .DELETE_ON_ERROR:
 
 help:  ## show this list
@@ -85,12 +91,24 @@ $(MADE):
 	$$python -m venv --clear $(if $(ROS),--system-site-packages) $(VENV)
 	@touch $@
 
-# The compiled messages of a ROS installation need the NumPy that they were built with.
-$(DEPENDENCIES): setup.py pyproject.toml $(MADE)
-	$(BIN)/python -m pip install --quiet --progress-bar off 'setuptools>=70.1,<80' \
+# Without ROS: exactly what LOCK lists, by its hashes, for any Python from 3.10 to 3.13. An index
+# that has not all of it, or another kind of machine, leaves the ranges of setup.py; a file that is
+# not the one listed ends it all. The compiled messages of a ROS installation need the NumPy that
+# they were built with, hence ranges there too.
+$(DEPENDENCIES): setup.py pyproject.toml $(LOCK) $(MADE)
+	@$(if $(and $(LOCK),$(if $(ROS),,yes)), \
+	if $(PIP) --require-hashes -r $(LOCK) 2>$(VENV)/lock.log; then touch $@; exit 0; fi; \
+	if grep -i 'do not match the hashes' -A 8 $(VENV)/lock.log >&2; then exit 1; fi; \
+	echo '$(LOCK) cannot be installed here ($(VENV)/lock.log); taking the ranges of setup.py' >&2;) \
+	$(PIP) $(SETUPTOOLS) \
 	  $(if $(ROS),"numpy==$$(python3 -c 'import numpy; print(numpy.__version__)')") \
-	  '.[$(if $(ROS),,jazzy,)plot,test]'
-	@touch $@
+	  '.[$(if $(ROS),,jazzy$(comma)lint$(comma))plot,test]' && touch $@
+
+lock: $(MADE)  ## renew requirements.lock from the ranges of setup.py
+	$(PIP) '.[lock]'
+	echo $(SETUPTOOLS) | $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header \
+	  --no-annotate --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple \
+	  --extra jazzy --extra lint --extra plot --extra test setup.py - -o requirements.lock
 
 # The comparison goes on without libraries that cannot be had here.
 $(PEERS): setup.py $(DEPENDENCIES)

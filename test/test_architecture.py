@@ -288,10 +288,38 @@ def test_test_dependencies_agree():
         name.replace('pyyaml', 'yaml')
         for name in distributions(setup_arguments()['extras_require']['test'])
     }
-    declared = {name.removeprefix('python3-') for name in manifest('test_depend')}
-    only_pip = {'mpmath', 'mypy', 'pytest-timeout', 'pytest-xdist', 'ruff'}
+    linters = {name for name in manifest('test_depend') if name.startswith('ament_')}
+    declared = {name.removeprefix('python3-') for name in manifest('test_depend') - linters}
+    only_pip = {'mpmath', 'mypy', 'pytest-xdist', 'ruff'}
     only_pip |= {'aiohttp', 'mcap', 'mcap-ros2-support', 'rosbags', 'zstandard'}
     assert declared | only_pip == extra
+    wheels = distributions(setup_arguments()['extras_require']['lint'])
+    assert linters - {'ament_copyright'} == {  # of which there is no wheel
+        name.removeprefix('ros-jazzy-').replace('-', '_')
+        for name in wheels
+        if name.startswith('ros-jazzy-')
+    }
+
+
+def test_the_lock_is_hashed_and_names_no_index():
+    text = (CHECKOUT / 'requirements.lock').read_text('utf-8')
+    assert not re.search(r'://|^--|@ ', text, re.MULTILINE)
+    pinned = re.split(r'^(?=\w)', text, flags=re.MULTILINE)[1:]
+    assert all(re.match(r'[\w.-]+(\[\w,-]+\])?==\S+', entry) for entry in pinned)
+    assert all('--hash=sha256:' in entry for entry in pinned)
+
+
+def test_the_lock_holds_what_make_installs():
+    text = (CHECKOUT / 'requirements.lock').read_text('utf-8')
+    locked = {name.lower() for name in re.findall(r'^([\w.-]+?)(?:\[[^]]*\])?==', text, re.M)}
+    arguments = setup_arguments()
+    wanted = set(distributions(arguments['install_requires']))
+    for extra in ('jazzy', 'lint', 'plot', 'test'):
+        wanted |= distributions(arguments['extras_require'][extra])
+        for requirement in arguments['extras_require'][extra]:
+            exact = re.match(r'([\w.-]+)(?:\[\w+\])?==(\S+)', requirement)
+            assert exact is None or f'\n{exact[1]}=={exact[2]}' in text.replace('[fastrtps]', '')
+    assert wanted | {'setuptools'} <= locked
 
 
 def test_what_is_imported_is_declared():
