@@ -62,7 +62,7 @@ MAY_IMPORT = {
     'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',
     'plan_samples': 'flatness arm errors',
     'goal': 'errors',
-    'timeline': 'limits planning plan_samples',
+    'timeline': 'limits planning plan_samples cost',
     'stopping': 'limits planning extremal solutions errors',
     'extrema': 'planning plan_samples solutions',
     'limits': 'extrema planning errors',

@@ -115,6 +115,7 @@ class PlannerSession:
         duration = settings.checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
         timed = answer(settings, origin, target, duration)
+        wanted = settings.options.strategy
         motion = Motion(
             plan_id=self._count + 1,
             plan=timed.plan,
@@ -123,6 +124,7 @@ class PlannerSession:
             planned_at=now,
             duration_min=timed.duration_min,
             exceeded=timed.exceeded,
+            replaced_strategy=None if timed.plan.options.strategy is wanted else wanted,
         )
         motion = self._launched(motion, origin, goal.stamp, clock)
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
