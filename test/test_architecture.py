@@ -94,6 +94,7 @@ MESSAGES_ALLOWED = {
     'conversions.py': 'the one place for messages and core types',
     'diagnostics.py': 'the same for verdicts and reports',
     '*_node.py': 'the types of its topics and services',
+    'model_adoption.py': 'hears reports and answers a service for the planner node',
     'parameters.py': 'descriptors and verdicts of parameters, from rcl_interfaces',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
 }
