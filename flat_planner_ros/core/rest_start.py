@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from flat_planner_ros.core.goal import Reason, RequestRejected
 from flat_planner_ros.core.motion_record import JointSample
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.session_settings import SessionSettings, StartSource
 import numpy as np
 

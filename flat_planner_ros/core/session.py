@@ -6,9 +6,10 @@ from enum import Enum
 from typing import NamedTuple
 
 from flat_planner_ros.core.answer import answer
-from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.goal import Goal, rest_target
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.rest_start import RestStart
 from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.stopping import stop_plan

@@ -7,10 +7,11 @@ from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
+from flat_planner_ros.core.goal import Goal, GoalPoint
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import plan, PlanningOptions
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.session import Outcome, PlannerSession
 from flat_planner_ros.core.session_settings import SessionSettings, StartSource
 from flat_planner_ros.core.simulation import SimulatedArm
