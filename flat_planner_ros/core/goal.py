@@ -1,7 +1,7 @@
 """Goals as users send them, and the rules that an admissible one obeys (docs/interfaces.md)."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import NamedTuple
@@ -218,38 +218,40 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
 
 def _check_rest(goal: Goal, final: GoalPoint) -> None:
     """Refuse an end in motion."""
-    for quantity, values in _derivatives(final):
-        for name, value in zip(goal.joint_names, values, strict=False):
-            if value != 0.0:
-                raise RequestRejected(
-                    Reason.NONZERO_END_STATE,
-                    f'the motion must end at rest, but the final {quantity} of {name} is '
-                    f'{value:g}; leave it out or set it to 0',
-                    joint=name,
-                    value=value,
-                    limit=0.0,
-                )
+    for quantity, name, value in _moving(goal, final):
+        raise RequestRejected(
+            Reason.NONZERO_END_STATE,
+            f'the motion must end at rest, but the final {quantity} of {name} is {value:g}; '
+            f'leave it out or set it to 0',
+            joint=name,
+            value=value,
+            limit=0.0,
+        )
 
 
 def _check_only_passed(goal: Goal, point: GoalPoint) -> None:
     """Refuse velocities and accelerations of via points, which the planner chooses."""
-    for quantity, values in _derivatives(point):
+    for quantity, name, value in _moving(goal, point):
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'via points prescribe positions only, but there the {quantity} of {name} is '
+            f'{value:g}; leave it out, the planner chooses it',
+            joint=name,
+            value=value,
+            limit=0.0,
+            time=point.time,
+        )
+
+
+def _moving(goal: Goal, point: GoalPoint) -> Iterator[tuple[str, str, float]]:
+    """Yield the quantity, joint and value of every derivative of a point that is not zero."""
+    for quantity, values in (
+        ('velocity', point.velocities),
+        ('acceleration', point.accelerations),
+    ):
         for name, value in zip(goal.joint_names, values, strict=False):
             if value != 0.0:
-                raise RequestRejected(
-                    Reason.INVALID_GOAL,
-                    f'via points prescribe positions only, but there the {quantity} of {name} is '
-                    f'{value:g}; leave it out, the planner chooses it',
-                    joint=name,
-                    value=value,
-                    limit=0.0,
-                    time=point.time,
-                )
-
-
-def _derivatives(point: GoalPoint) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return what a point says of the motion, by name."""
-    return ('velocity', point.velocities), ('acceleration', point.accelerations)
+                yield quantity, name, value
 
 
 def _angles(goal: Goal, point: GoalPoint, joints: Sequence[str]) -> tuple[float, ...]:

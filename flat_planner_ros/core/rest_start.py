@@ -15,6 +15,11 @@ class RestStart:
         """Know no measurement."""
         self._measured: JointSample | None = None
 
+    @property
+    def measured(self) -> JointSample | None:
+        """Return the last measured state, None before the first."""
+        return self._measured
+
     def measure(self, sample: JointSample, timeout: float) -> None:
         """
         Take a measured state unless it comes late.

@@ -84,6 +84,11 @@ class PlannerSession:
             raise RequestRejected(Reason.EMPTY_GOAL, 'no goal has been accepted yet')
         return self._last_goal
 
+    @property
+    def measured(self) -> JointSample | None:
+        """Return the last measured state, None before the first."""
+        return self._rest.measured
+
     def measure(self, sample: JointSample) -> None:
         """Take the measured state, in the order of the session's joints, unless it comes late."""
         self._rest.measure(sample, self.settings.measurement_timeout)
