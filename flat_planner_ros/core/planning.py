@@ -19,7 +19,7 @@ from flat_planner_ros.core.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.shaped_course import shaped_course
-from flat_planner_ros.core.task import fractions, Task, task_of
+from flat_planner_ros.core.task import even_times, Task, task_of
 from flat_planner_ros.core.via_points import optimal_path
 from flat_planner_ros.core.via_times import path_of
 import numpy as np
@@ -126,7 +126,7 @@ class Plan:
         """
         intervals = max(1, ceil(self.duration / period - SPACING_TOLERANCE))
         planned, torque = self.course.on_even_grid(intervals)
-        return self._samples(self.duration * fractions(intervals), planned, torque)
+        return self._samples(even_times(self.duration, intervals), planned, torque)
 
     def at(self, times: FloatArray) -> PlanSamples:
         """

@@ -52,7 +52,7 @@ class PlannerNode(Node):
             (JointTrajectory, interfaces.GOAL, self._on_goal),
             (JointState, interfaces.GOAL_STATE, self._on_goal_state),
         ):
-            listen(kind, topic, heard, interfaces.RELIABLE, raw=True)
+            listen(kind, topic, heard, interfaces.BURST, raw=True)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
         self._adoption = ModelAdoption(
             self, lambda: self._settings, lambda: self._sent_start, self._publish_status
