@@ -21,7 +21,8 @@ NODES = sorted(ROS.glob('*_node.py'))
 MAY_IMPORT = {
     'errors': '',
     'links': 'errors',
-    'arm': 'links errors',
+    'stacks': '',
+    'arm': 'links stacks errors',
     'counterbalance': 'links errors',
     'link_bodies': 'links errors',
     # the plant
