@@ -7,6 +7,7 @@ from flat_planner_ros.core.adoption import (
     ReportedEstimate,
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
+from flat_planner_ros.core.assessment import load_libraries
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.counterbalance import (
     Counterbalances,
@@ -125,6 +126,7 @@ __all__ = [
     'Level',
     'LimitUse',
     'LinkBody',
+    'load_libraries',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
     'MAX_WEIGHT',
