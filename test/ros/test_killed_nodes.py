@@ -1,4 +1,4 @@
-"""Nodes killed and started again in the midst of a motion: nothing moves by itself, all goes on."""
+"""Nodes killed and started again in the midst of a motion: nothing moves by itself."""
 
 import numpy as np
 import pytest
