@@ -47,10 +47,7 @@ def draw(
         matplotlib is not installed.
 
     """
-    import matplotlib as mpl
-
-    mpl.use('Agg')  # A terminal without a display is enough.
-    from matplotlib import pyplot as plt
+    from flat_planner_ros.file_plot import plt
 
     elapsed = times - motion.start
     end = motion.end - motion.start

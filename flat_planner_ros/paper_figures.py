@@ -45,10 +45,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
         matplotlib is not installed.
 
     """
-    import matplotlib as mpl
-
-    mpl.use('Agg')  # A terminal without a display is enough.
-    from matplotlib import pyplot as plt
+    from flat_planner_ros.file_plot import plt
 
     scenarios = list(dict.fromkeys(result.scenario for result in results))
     figure, axes = plt.subplots(

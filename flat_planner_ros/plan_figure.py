@@ -4,10 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flat_planner_ros.core import Track
-import matplotlib
-
-matplotlib.use('Agg')
-from matplotlib import pyplot as plt  # noqa: E402  The backend is chosen before.
+from flat_planner_ros.file_plot import plt
 
 ROWS = (
     ('positions', 'position [rad]'),

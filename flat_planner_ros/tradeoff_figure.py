@@ -38,10 +38,7 @@ def draw(points: Sequence[TradeoffPoint], box: str, path: Path) -> None:
         matplotlib is not installed.
 
     """
-    import matplotlib as mpl
-
-    mpl.use('Agg')  # A terminal without a display is enough.
-    from matplotlib import pyplot as plt
+    from flat_planner_ros.file_plot import plt
     from matplotlib.lines import Line2D
 
     figure, axis = plt.subplots(figsize=(9.0, 6.0))

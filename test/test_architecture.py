@@ -21,7 +21,8 @@ NODES = sorted(ROS.glob('*_node.py'))
 MAY_IMPORT = {
     'errors': '',
     'links': 'errors',
-    'arm': 'links errors',
+    'stacks': '',
+    'arm': 'links stacks errors',
     'counterbalance': 'links errors',
     'link_bodies': 'links errors',
     # the plant
@@ -63,12 +64,12 @@ MAY_IMPORT = {
     'plan_samples': 'flatness arm errors',
     'rejection': 'errors',
     'goal': 'rejection',
-    'timeline': 'limits planning plan_samples cost',
+    'timeline': 'limits certified_plan plan_samples cost',
     'stopping': 'limits planning extremal solutions errors',
-    'extrema': 'planning plan_samples solutions',
-    'limits': 'extrema planning errors',
-    'duration': 'limits extrema planning errors',
-    'timing': 'duration limits extrema planning rejection',
+    'extrema': 'certified_plan plan_samples solutions',
+    'limits': 'extrema certified_plan errors',
+    'duration': 'limits extrema certified_plan errors',
+    'timing': 'duration limits extrema certified_plan rejection',
     'session_settings': 'timing limits request rejection arm errors',
     'rest_start': 'session_settings motion_record rejection',
     'takeover': 'timeline solutions rejection',
@@ -86,8 +87,9 @@ MAY_IMPORT = {
     'via_points': 'coupling segment_basis piecewise_law moving_start unit_motion extremal '
     'solutions motion_law cost errors',
     'via_times': 'via_points task request solutions cost arm errors',
-    'planning': 'via_times via_points shaped_course moving_start course task request plan_samples '
-    'cost flatness arm errors',
+    'certified_plan': 'course task request plan_samples cost flatness errors',
+    'planning': 'certified_plan via_times via_points shaped_course moving_start course task '
+    'request plan_samples cost flatness arm errors',
 }
 """The modules of the core, each with the others that it may import; a new one is added here."""
 

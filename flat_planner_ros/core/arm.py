@@ -5,9 +5,8 @@ The absolute link angles make one constant matrix and one constant vector descri
 balanced or not (docs/derivation.md).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from math import sqrt
 from typing import NamedTuple, TypeVar
 
@@ -20,6 +19,7 @@ from flat_planner_ros.core.links import (
     checked_vector,
     per_motor,
 )
+from flat_planner_ros.core.stacks import applied, last_of, solved, times_matrix
 import numpy as np
 import numpy.typing as npt
 
@@ -410,24 +410,24 @@ class PlanarArm:
         """
         net = np.empty(q.shape)
         net[..., :-1] = effort
-        net[..., -1] = self.passive_effort(_last(q), _last(dq))
+        net[..., -1] = self.passive_effort(last_of(q), last_of(dq))
         if self._has_friction:
             net[..., :-1] -= self.friction(dq)
         if self._inverse_mass is not None:
             if self.has_weight:
                 net -= self.gravity_effort(q)
-            return _row(net, self._inverse_mass)
+            return times_matrix(net, self._inverse_mass)
         theta = q.cumsum(axis=-1)
         apart = _apart(theta)
-        load = _row(net, self._difference) - self._centrifugal(apart, dq)
+        load = times_matrix(net, self._difference) - self._centrifugal(apart, dq)
         if self.has_weight:
             load -= self._weight(theta)
-        return _row(_solve(self._link_inertia(apart), load), self._difference.T)
+        return times_matrix(solved(self._link_inertia(apart), load), self._difference.T)
 
     def energy(self, q: Array, dq: Array) -> Array:
         """Return kinetic, gravitational and elastic energy together [J], shape (...)."""
         theta, rate = np.cumsum(q, axis=-1), np.cumsum(dq, axis=-1)
-        momentum = _apply(self._link_inertia(_apart(theta)), rate)
+        momentum = applied(self._link_inertia(_apart(theta)), rate)
         weight = self.gravity * self.static_moment * np.sin(theta)
         links: Array = np.sum(rate * momentum / 2 + weight, axis=-1)
         return links - q[..., -1] * self.passive_effort(q[..., -1], np.zeros_like(links)) / 2
@@ -458,7 +458,7 @@ class PlanarArm:
 
     def _centrifugal(self, apart: Array, dq: Array) -> Array:
         """Return the centrifugal torque on each link, shape (..., n)."""
-        return _apply(self.inertia * np.sin(apart), dq.cumsum(axis=-1) ** 2)
+        return applied(self.inertia * np.sin(apart), dq.cumsum(axis=-1) ** 2)
 
     def _weight(self, theta: Array) -> Array:
         """Return the torque that holds each link against gravity, shape (..., n)."""
@@ -501,42 +501,3 @@ class PlanarArm:
 def _apart(theta: Array) -> Array:
     """Return theta_i - theta_j, shape (..., n, n)."""
     return theta[..., :, None] - theta[..., None, :]
-
-
-def _apply(matrix: Array, vector: Array) -> Array:
-    """Return the product with each vector of a stack, shape (..., n)."""
-    # The first case is what simulations ask for, 4000 times per simulated second.
-    product: Array = (
-        matrix.dot(vector) if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0]
-    )
-    return product
-
-
-def _row(vector: Array, matrix: Array) -> Array:
-    """Return the product of each vector of a stack with a matrix, shape (..., n)."""
-    product: Array = vector.dot(matrix)
-    return product
-
-
-def _solve(matrix: Array, vector: Array) -> Array:
-    """Return the solution with each symmetric positive definite matrix of a stack, (..., n)."""
-    if vector.ndim == 1:
-        # A quarter of the time of numpy's, which looks after stacks; symmetric: .T is a view.
-        solution: Array = _positive_definite_solver()(matrix.T, vector, overwrite_a=1)[1]
-        return solution
-    return np.asarray(np.linalg.solve(matrix, vector[..., None])[..., 0], dtype=float)
-
-
-@cache
-def _positive_definite_solver() -> Callable[..., tuple[Array, Array, int]]:
-    """Return LAPACK's dposv; slow to import, and only arms with coupled links need it."""
-    from scipy.linalg.lapack import dposv
-
-    return dposv  # type: ignore[no-any-return]
-
-
-def _last(values: Array) -> Array:
-    """Return the entries of the last joint, shape (...)."""
-    # A scalar, not an array without axes: ten times faster in what follows.
-    last: Array = values[-1] if values.ndim == 1 else values[..., -1]
-    return last

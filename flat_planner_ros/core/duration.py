@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isfinite, log, sqrt
 
+from flat_planner_ros.core.certified_plan import Plan
 from flat_planner_ros.core.errors import (
     FlatPlannerError,
     InvalidRequest,
@@ -19,7 +20,6 @@ from flat_planner_ros.core.errors import (
 )
 from flat_planner_ros.core.extrema import Quantity
 from flat_planner_ros.core.limits import JointLimits, LimitUse
-from flat_planner_ros.core.planning import Plan
 import numpy as np
 
 DURATION_TOLERANCE = 2e-4

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from flat_planner_ros.core.certified_plan import Plan
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.planning import Plan
 from flat_planner_ros.core.solutions import CONDITIONS
 import numpy as np
 from numpy.typing import NDArray

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+from flat_planner_ros.core.certified_plan import Plan
 from flat_planner_ros.core.errors import InvalidRequest
 from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
-from flat_planner_ros.core.planning import Plan
 import numpy as np
 from numpy.typing import NDArray
 

@@ -10,10 +10,10 @@ seam (docs/derivation.md, section S).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from flat_planner_ros.core.certified_plan import Plan
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.limits import LimitUse
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.planning import Plan
 import numpy as np
 from numpy.typing import NDArray
 

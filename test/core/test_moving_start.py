@@ -1,6 +1,6 @@
 """Motions that start in the midst of another one."""
 
-from flat_planner_ros.core import moving_start, planning
+from flat_planner_ros.core import certified_plan, moving_start
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import UncertifiedPlan
@@ -162,7 +162,7 @@ def test_a_distant_place_costs_no_digits(arm):
     ],
 )
 def test_refuses_a_law_that_misses_its_certificate(monkeypatch, arm, constant, quantity):
-    monkeypatch.setattr(planning, constant, 0.0)
+    monkeypatch.setattr(certified_plan, constant, 0.0)
     with pytest.raises(UncertifiedPlan, match=quantity):
         plan(request_from(random_jets(7)), arm, STRATEGIES['mixed'])
 

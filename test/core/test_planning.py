@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from flat_planner_ros.core import planning, unit_motion
+from flat_planner_ros.core import certified_plan, unit_motion
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import InvalidCost, InvalidRequest, NotFlat, UncertifiedPlan
@@ -226,7 +226,7 @@ def test_cost_value_is_the_integral(name, paper_arm):
 def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, constant, quantity):
     options = STRATEGIES['mixed']
     plan(half_turn(), paper_arm, options)
-    monkeypatch.setattr(planning, constant, 0.0)
+    monkeypatch.setattr(certified_plan, constant, 0.0)
     with pytest.raises(UncertifiedPlan, match=quantity) as caught:
         plan(half_turn(), paper_arm, options)
     assert caught.value.quantity == quantity

@@ -551,7 +551,7 @@ def test_contradictory_settings_are_refused(changes):
 
 
 def test_a_request_beyond_double_precision_is_ill_conditioned(monkeypatch):
-    monkeypatch.setattr('flat_planner_ros.core.planning.BOUNDARY_TOLERANCE', 0.0)
+    monkeypatch.setattr('flat_planner_ros.core.certified_plan.BOUNDARY_TOLERANCE', 0.0)
     error = reason_of(session().submit, GOAL, NOW)
     assert error.reason is Reason.ILL_CONDITIONED
     assert error.value > 0.0
