@@ -28,7 +28,7 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test fuzz bench docs lint install clean FORCE
+.PHONY: help demo test fuzz bench docs examples lint install clean FORCE
 .DELETE_ON_ERROR:
 
 help:  ## show this list
@@ -56,6 +56,12 @@ docs: install $(SITE)  ## the documentation as a site, build/docs/index.html
 	$(BIN)/python docs/parameter_tables.py
 	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs $(ARGS)
 	@echo 'open build/docs/index.html'
+
+examples: install  ## run examples/, which renews the pictures in docs/images/examples
+	@mkdir -p build/examples
+	for file in examples/*.py; do \
+	  MPLBACKEND=Agg $(BIN)/python $$file build/examples/$$(basename $$file .py).png || exit 1; done
+	cp build/examples/*.png docs/images/examples/
 
 lint: install  ## ruff and mypy only
 	$(BIN)/python -m ruff check

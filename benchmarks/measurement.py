@@ -13,13 +13,14 @@ class Timing(NamedTuple):
 
     Attributes
     ----------
-    median, worst
+    best, median, worst
         Of all calls but the first ones [s].
     count
         Number of calls that were timed [-].
 
     """
 
+    best: float
     median: float
     worst: float
     count: int
@@ -27,7 +28,7 @@ class Timing(NamedTuple):
     @classmethod
     def of(cls, times: Sequence[float]) -> 'Timing':
         """Return the summary of some times [s]."""
-        return cls(median(times), max(times), len(times))
+        return cls(min(times), median(times), max(times), len(times))
 
 
 class Section(NamedTuple):

@@ -7,6 +7,7 @@ from time import perf_counter
 from typing import Any
 
 from flat_planner_ros.core import Goal, GoalPoint, Motion, plan
+from flat_planner_ros.core.timeline import Timeline
 from flat_planner_ros.ros import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
 from measurement import duration_text, Section, Timing, timing, verdict
@@ -199,6 +200,8 @@ def _parts_section() -> Section:
     arm, request = problem.arm(), problem.request()
     period = problem.DURATION / (WATCHED - 1)
     motion, msg = _motion(WATCHED), _goal(pi)
+    timeline = Timeline([motion])
+    track = timeline.track(motion.planned_at)
     goal = Goal(
         joint_names=('joint1',), points=(GoalPoint(time=problem.DURATION, positions=(pi,)),)
     )
@@ -211,8 +214,9 @@ def _parts_section() -> Section:
         ('read the goal', lambda _: conversions.goal_from_trajectory(msg), lambda: None),
         ('plan', lambda _: plan(request, arm, problem.OPTIONS), lambda: None),
         ('sample', lambda _: motion.plan.sample(period), lambda: None),
-        ('build the plan', lambda _: conversions.command_bytes(motion, JOINTS), lambda: None),
-        ('build the flat plan', lambda _: conversions.flat_plan_bytes(motion), lambda: None),
+        ('gather the points', lambda _: timeline.track(motion.planned_at), lambda: None),
+        ('build the plan', lambda _: conversions.command_bytes(track, JOINTS), lambda: None),
+        ('build the flat plan', lambda _: conversions.flat_plan_bytes(track), lambda: None),
         (
             'verdict with peaks and RMS values',
             lambda new: diagnostics.accepted_status(new, goal, JOINTS, 0.0),
@@ -242,9 +246,10 @@ def _building_section() -> Section:
     rows = []
     for points in POINTS:
         motion = _motion(points)
-        msg = deserialize_message(conversions.command_bytes(motion, JOINTS), JointTrajectory)
+        track = Timeline([motion]).track(motion.planned_at)
+        msg = deserialize_message(conversions.command_bytes(track, JOINTS), JointTrajectory)
         assert [p.positions.tolist() for p in msg.points] == motion.samples.positions.tolist()
-        build = timing(lambda _, m=motion: conversions.command_bytes(m, JOINTS))
+        build = timing(lambda _, t=track: conversions.command_bytes(t, JOINTS))
         rows.append(
             (
                 f'{points}',

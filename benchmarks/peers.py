@@ -35,6 +35,10 @@ BEZIER_TIMES = 25
 """Times at which it adds up the cost."""
 
 
+MAX_NODES = 200_000
+"""Most nodes of the mesh of `solve_bvp`."""
+
+
 class Peer(NamedTuple):
     """
     A library and how it is used.
@@ -79,8 +83,22 @@ def weights() -> tuple[FloatArray, FloatArray]:
     return sixth, problem.WEIGHT**4 * torque
 
 
-def boundary_value(tolerance: float, *, plain: bool = False) -> Callable[[], Solver]:
-    """Return SciPy's solver on the Euler-Lagrange equation; plain: without guess and Jacobians."""
+def boundary_value(
+    tolerance: float, *, plain: bool = False, is_scaled: bool = True
+) -> Callable[[], Solver]:
+    """
+    Return SciPy's solver on the Euler-Lagrange equation.
+
+    Parameters
+    ----------
+    tolerance
+        Its relative residual [-].
+    plain
+        Without guess and Jacobians.
+    is_scaled
+        Whether time is scaled; otherwise the equation stands as it is stated, in seconds.
+
+    """
 
     def prepare() -> Solver:
         from scipy.integrate import solve_bvp
@@ -89,7 +107,7 @@ def boundary_value(tolerance: float, *, plain: bool = False) -> Callable[[], Sol
         cost = strategy_cost(problem.OPTIONS.strategy, mapping, r=problem.WEIGHT)
         a = cost.characteristic()
         # Time in units of the fastest even rate, so that all twelve unknowns are of one size.
-        unit = np.abs(a[2]) ** -0.125
+        unit = np.abs(a[2]) ** -0.125 if is_scaled else 1.0
         system = np.eye(12, k=1)
         system[-1, ::2] = -a[:6] * unit ** (12.0 - 2.0 * np.arange(6))
         end = problem.DURATION / unit
@@ -119,7 +137,7 @@ def boundary_value(tolerance: float, *, plain: bool = False) -> Callable[[], Sol
                 guess,
                 **jacobians,
                 tol=tolerance,
-                max_nodes=200_000,
+                max_nodes=MAX_NODES,
             )
             jet = found.sol(problem.TIMES / unit)[: problem.ORDERS] / unit**orders
             return problem.Answer(jet, problem.effort(jet))
@@ -300,10 +318,22 @@ PEERS = (
     Peer('Drake, quadratic programme', 'pydrake', drake_programme, 1e-3),
     Peer('CasADi, quadratic programme (qrqp)', 'casadi', casadi_programme, 1e-3),
     Peer('CasADi, collocation (IPOPT)', 'casadi', casadi_collocation, 0.1),
-    Peer('SciPy solve_bvp, 1e-3, tuned', 'scipy', boundary_value(1e-3), 0.1),
-    Peer('SciPy solve_bvp, 1e-6, tuned', 'scipy', boundary_value(1e-6), 0.1),
-    Peer('SciPy solve_bvp, 1e-3', 'scipy', boundary_value(1e-3, plain=True), 0.1),
-    Peer('SciPy solve_bvp, 1e-6', 'scipy', boundary_value(1e-6, plain=True), 0.1),
+    Peer('SciPy solve_bvp, 1e-3, scaled and tuned', 'scipy', boundary_value(1e-3), 0.1),
+    Peer('SciPy solve_bvp, 1e-6, scaled and tuned', 'scipy', boundary_value(1e-6), 0.1),
+    Peer('SciPy solve_bvp, 1e-3, scaled', 'scipy', boundary_value(1e-3, plain=True), 0.1),
+    Peer('SciPy solve_bvp, 1e-6, scaled', 'scipy', boundary_value(1e-6, plain=True), 0.1),
+    Peer(
+        'SciPy solve_bvp, 1e-3, in seconds',
+        'scipy',
+        boundary_value(1e-3, plain=True, is_scaled=False),
+        0.1,
+    ),
+    Peer(
+        'SciPy solve_bvp, 1e-6, in seconds',
+        'scipy',
+        boundary_value(1e-6, plain=True, is_scaled=False),
+        0.1,
+    ),
     Peer('python-control point_to_point', 'control', python_control, 1.0),
 )
 """All peers, from fast to slow."""

@@ -6,8 +6,16 @@ from itertools import count
 from typing import NamedTuple
 import warnings
 
-from flat_planner_ros.core import MotionRequest, Plan, plan, PlanarArm
+from flat_planner_ros.core import (
+    MotionRequest,
+    Plan,
+    plan,
+    PlanarArm,
+    PlanningOptions,
+    Strategy,
+)
 from measurement import duration_text, Section, Timing, timing, verdict
+import numpy as np
 from peers import Peer, PEERS, Solver
 import problem
 
@@ -21,8 +29,9 @@ OWN_ERROR = 1e-9
 """Largest error of our answer relative to each derivative's peak [-]."""
 
 PEER_TARGETS = {
-    'SciPy solve_bvp, 1e-3': 100.0,
-    'SciPy solve_bvp, 1e-3, tuned': 100.0,
+    'SciPy solve_bvp, 1e-3, in seconds': 100.0,
+    'SciPy solve_bvp, 1e-3, scaled': 100.0,
+    'SciPy solve_bvp, 1e-3, scaled and tuned': 100.0,
     'CasADi, collocation (IPOPT)': 100.0,
     'python-control point_to_point': 1000.0,
 }
@@ -33,6 +42,19 @@ PEER_BUDGET = 3.0
 
 STEP = 1e-6
 """Difference of two durations, so that no law is known from before [s]."""
+
+_CROWDED = np.outer([0.0, 49.0**2, 0.0, -98.0, 0.0, 1.0], [0.0, 49.0**2, 0.0, -98.0, 0.0, 1.0])
+
+COSTS = {
+    'polynomial': PlanningOptions(strategy=Strategy.POLYNOMIAL),
+    'min potential energy, p = 17': PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY),
+    'mixed': PlanningOptions(strategy=Strategy.MIXED),
+    'min control effort, r = 30: twelve roots around zero': PlanningOptions(
+        strategy=Strategy.MIN_CONTROL_EFFORT, r=30.0
+    ),
+    'custom: a fourfold real root': PlanningOptions(strategy=Strategy.CUSTOM, custom=_CROWDED),
+}
+"""Costs besides the one that all libraries share."""
 
 _numbers = count(1)
 
@@ -60,7 +82,7 @@ def sections(options: Namespace) -> list[Section]:
     cold = own[1]
     rows = [cold, *(row for peer in PEERS if (row := _peer_row(peer)) is not None)]
     missing = [peer.name for peer in PEERS if find_spec(peer.module) is None]
-    return [_own_section(own), _peer_section(rows, missing)]
+    return [_own_section(own), _costs_section(), _peer_section(rows, missing)]
 
 
 def answer(made: Plan) -> problem.Answer:
@@ -140,12 +162,13 @@ def _own_section(rows: list[Row]) -> Section:
     cached_met = rows[0].warm.median <= CACHED_TARGET
     return Section(
         "Planning the paper's motion",
-        ('plan', 'cold: median', 'worst', 'new distance: median', 'worst', 'error'),
+        ('plan', 'cold: best', 'median', 'new distance: best', 'median', 'worst', 'error'),
         [
             (
                 row.name,
+                duration_text(row.cold.best),
                 duration_text(row.cold.median),
-                duration_text(row.cold.worst),
+                duration_text(row.warm.best),
                 duration_text(row.warm.median),
                 duration_text(row.warm.worst),
                 f'{row.error:.1g}',
@@ -158,6 +181,21 @@ def _own_section(rows: list[Row]) -> Section:
             f'new distance from the cached law, target {duration_text(CACHED_TARGET)}: '
             f'{verdict(cached_met)}',
         ],
+    )
+
+
+def _costs_section() -> Section:
+    """Return the times of cold plans of other costs, whose roots lie in other ways."""
+    rows = []
+    for name, options in COSTS.items():
+
+        def step(task: Task, options: PlanningOptions = options) -> object:
+            return answer(plan(task.request, task.arm, options))
+
+        time = timing(step, new_task)
+        rows.append((name, *map(duration_text, (time.best, time.median, time.worst))))
+    return Section(
+        'Cold plans with 1001 samples of other costs', ('cost', 'best', 'median', 'worst'), rows
     )
 
 

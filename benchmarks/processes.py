@@ -57,16 +57,21 @@ class NodeProcess:
         What spins it.
     parameters
         Its parameters by name, as on the command line.
+    file
+        Of parameters that come before these.
 
     """
 
-    def __init__(self, name: str, executor: str, parameters: dict[str, str]) -> None:
+    def __init__(
+        self, name: str, executor: str, parameters: dict[str, str], file: Path | None = None
+    ) -> None:
         """Start it."""
         program = ['-m', f'flat_planner_ros.ros.{name}_node']
         if executor != SHIPPED:
             program = [str(Path(__file__).parent / 'spin_node.py'), name, executor]
         values = [f'{key}:={value}' for key, value in parameters.items()]
-        overrides = [word for value in values for word in ('-p', value)]
+        overrides = ['--params-file', str(file)] if file else []
+        overrides += [word for value in values for word in ('-p', value)]
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  Closed by `stop`.
         self._popen = subprocess.Popen(
             [sys.executable, *program, '--ros-args', *overrides],

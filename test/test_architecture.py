@@ -68,8 +68,12 @@ MAY_IMPORT = {
     'limits': 'extrema planning errors',
     'duration': 'limits extrema planning errors',
     'timing': 'duration limits extrema planning goal errors',
-    'session': 'via_times request stopping timeline timing limits planning plan_samples solutions '
-    'goal motion_record cost flatness arm errors',
+    'session_settings': 'timing limits request goal arm errors',
+    'rest_start': 'session_settings motion_record goal',
+    'takeover': 'timeline solutions goal',
+    'answer': 'takeover session_settings timing via_times planning request goal errors',
+    'session': 'answer rest_start takeover session_settings stopping timeline plan_samples goal '
+    'motion_record',
     'request': 'insensitivity solutions cost flatness errors',
     'task': 'request unit_motion solutions cost flatness arm errors',
     'course': 'task unit_motion quadrature solutions motion_law flatness',

@@ -68,13 +68,8 @@ from flat_planner_ros.core.robustness import (
 )
 from flat_planner_ros.core.rollout import rollout
 from flat_planner_ros.core.sensing import Sensing
-from flat_planner_ros.core.session import (
-    Ended,
-    Outcome,
-    PlannerSession,
-    SessionSettings,
-    StartSource,
-)
+from flat_planner_ros.core.session import Ended, Outcome, PlannerSession
+from flat_planner_ros.core.session_settings import SessionSettings, StartSource
 from flat_planner_ros.core.shaping import shaped_quintic, Shaper
 from flat_planner_ros.core.simulation import ArmState, SimulatedArm
 from flat_planner_ros.core.simulation_settings import SimulationSettings

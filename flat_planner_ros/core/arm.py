@@ -383,11 +383,12 @@ class PlanarArm:
     def rigid_effort(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Return the effort M ddq + b + g of a motion, without friction and spring, (..., n)."""
         theta = np.cumsum(q, axis=-1)
-        apart = _apart(theta)
-        momentum_rate = _apply(self._link_inertia(apart), np.cumsum(ddq, axis=-1))
-        effort: Array = (
-            momentum_rate + self._centrifugal(apart, dq) + self._weight(theta)
-        ) @ self._sum
+        cos, sin = np.cos(theta), np.sin(theta)
+        along, across = np.cumsum(ddq, axis=-1), np.cumsum(dq, axis=-1) ** 2
+        # cos and sin of differences by the addition theorems: in n angles, not in n^2 differences.
+        torque = cos * ((cos * along - sin * across) @ self.inertia + self._static_load)
+        torque += sin * ((sin * along + cos * across) @ self.inertia)
+        effort: Array = torque @ self._sum
         return effort
 
     def forward_dynamics(self, q: Array, dq: Array, effort: Array) -> Array:

@@ -17,6 +17,9 @@ Array = npt.NDArray[np.float64]
 BALANCED = 2
 """Links that must be balanced, the last ones."""
 
+SUGGESTED_ARM = 0.25
+"""Arm of a counterbalance that is suggested where there is none, over the link's length [-]."""
+
 
 class Counterbalances(NamedTuple):
     """
@@ -106,6 +109,8 @@ def remedy(
     """
     Return in words which counterbalances would balance an arm.
 
+    An arm without any is suggested arms of a quarter of the links' lengths.
+
     Parameters
     ----------
     link_length, link_com, link_mass
@@ -127,7 +132,15 @@ def remedy(
             f'counterbalance_{other} = [{numbers}] {unit} (with counterbalance_{given} as it is)'
         )
     if not ways:
-        return 'no counterbalance behind the joints can balance it'
+        arms = SUGGESTED_ARM * np.array(link_length, dtype=float)[-BALANCED:]
+        try:
+            masses = counterbalances(**links, arm=arms).mass.tolist()
+        except InvalidModel:
+            return 'no counterbalance behind the joints can balance it'
+        ways.append(
+            f'for example counterbalance_mass = [{masses[0]:.10g}, {masses[1]:.10g}] kg with '
+            f'counterbalance_arm = [{arms[0]:.10g}, {arms[1]:.10g}] m'
+        )
     return 'what balances both links: ' + ', or '.join(ways)
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.flatness import apply_row, FlatMap
+from flat_planner_ros.core.flatness import FlatMap
 import numpy as np
 from numpy.typing import NDArray
 
@@ -111,4 +111,7 @@ class PlanSamples:
 
 def _derivatives(row: FloatArray, jet: FloatArray, count: int) -> FloatArray:
     """Return the quantity of a row and its derivatives, shape (count, m)."""
-    return np.array([apply_row(row, jet, order) for order in range(count)])
+    table = np.empty((count, jet.shape[1]))
+    for order, values in enumerate(table):
+        np.matmul(row, jet[order : order + len(row)], out=values)
+    return table

@@ -1,145 +1,25 @@
 """Session of a planner: goals and measurements in, motions out, in the order of time."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
-from math import inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
-from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target, RestTarget
-from flat_planner_ros.core.limits import JointLimits
+from flat_planner_ros.core.answer import answer
+from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
-from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, ViaPoint
-from flat_planner_ros.core.request import planned_at_rest
-from flat_planner_ros.core.solutions import CONDITIONS
+from flat_planner_ros.core.rest_start import RestStart
+from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.stopping import stop_plan
+from flat_planner_ros.core.takeover import Origin, takeover, too_late
 from flat_planner_ros.core.timeline import Motion, Timeline, Track
-from flat_planner_ros.core.timing import OnViolation, TimedPlan, Timing
-from flat_planner_ros.core.via_times import with_via_times
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 Clock = Callable[[], float]
 
-LONGEST_FOUND = 3600.0
-"""Longest duration that is looked for where the settings name none [s]."""
-
 HANDOVER = 0.25
 """Part of the lookahead that is left for a command to reach its executor [-]."""
-
-
-NOMINAL_DURATION = 1.0
-"""Duration of a request before its own is found [s]."""
-
-
-class StartSource(Enum):
-    """Where the start of a motion is taken from."""
-
-    AUTO = 'auto'
-    """The measured state, unless another motion is under way or waits for its start."""
-
-    MEASURED = 'measured'
-    """The measured state of the actuated joints, the elastic one relaxed."""
-
-    REFERENCE = 'reference'
-    """The end of the last motion, checked against a measured state if there is one."""
-
-    PARAMETER = 'parameter'
-    """A given position, checked against a measured state if there is one."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SessionSettings:
-    """
-    Everything a session needs to know; may be replaced between goals.
-
-    Attributes
-    ----------
-    joints
-        Names in kinematic order, the passive one last.
-    arm, options
-        Nominal model and what is minimised.
-    period
-        Spacing of a motion's samples [s].
-    default_duration
-        Duration of goals without times [s]; 0 for the shortest within the limits.
-    min_duration, max_duration
-        Range of durations that are accepted [s].
-    limits
-        What the joints may do; None where nothing is limited.
-    on_violation
-        What becomes of durations that are too short for them.
-    start_source
-        Where motions start.
-    start_position
-        Start for the source `parameter`, shape (n,) [rad].
-    position_tolerance, velocity_tolerance
-        Largest deviation of a measured start from rest at the planned one [rad, rad/s].
-    measurement_timeout
-        Age from which a measurement is stale [s].
-    start_delay
-        From accepting a goal without a stamp to its start, at rest [s].
-    lookahead
-        The same while another motion is under way or waits for its start [s].
-    is_stamped
-        Whether the executor plays a command at its stamp; if it plays on arrival, no motion can
-        take over from another.
-    execute
-        Whether motions are carried out; if not, none keeps the session busy.
-
-    """
-
-    joints: tuple[str, ...]
-    arm: PlanarArm
-    options: PlanningOptions
-    period: float = 0.005
-    default_duration: float = 0.0
-    min_duration: float = 0.0
-    max_duration: float = inf
-    limits: JointLimits | None = None
-    on_violation: OnViolation = OnViolation.REJECT
-    start_source: StartSource = StartSource.AUTO
-    start_position: tuple[float, ...] = ()
-    position_tolerance: float = 0.01
-    velocity_tolerance: float = 0.1
-    measurement_timeout: float = 0.5
-    start_delay: float = 0.05
-    lookahead: float = 0.1
-    is_stamped: bool = True
-    execute: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse settings that contradict each other."""
-        if len(self.joints) != self.arm.n:
-            raise InvalidRequest(
-                f'{len(self.joints)} joint names for an arm of {self.arm.n} joints'
-            )
-        if len(set(self.joints)) != len(self.joints):
-            raise InvalidRequest(f'joint names must differ, got {", ".join(self.joints)}')
-        if self.max_duration < self.min_duration:
-            raise InvalidRequest(
-                f'duration.max = {self.max_duration:g} s is below duration.min = '
-                f'{self.min_duration:g} s'
-            )
-        if self.limits is not None and len(self.limits.velocity) != self.arm.n:
-            raise InvalidRequest(
-                f'limits of {len(self.limits.velocity)} joints for an arm of {self.arm.n} joints'
-            )
-        if self.start_source is StartSource.PARAMETER:
-            if len(self.start_position) != self.arm.n:
-                raise InvalidRequest(
-                    f'start.position needs {self.arm.n} angles, got {len(self.start_position)}'
-                )
-            if self.start_position[-1] != 0.0:
-                raise InvalidRequest(
-                    f'start.position of the passive joint must be 0 rad, got '
-                    f'{self.start_position[-1]:g} rad'
-                )
 
 
 class Outcome(Enum):
@@ -162,30 +42,6 @@ class Ended(NamedTuple):
     outcome: Outcome
 
 
-class Origin(NamedTuple):
-    """
-    Where a motion starts.
-
-    Attributes
-    ----------
-    time
-        Absolute [s].
-    pose
-        Angles of all joints, shape (n,) [rad].
-    jets
-        Derivatives 0 to 5 of the planned variables where the arm is planned to move then, shape
-        (n - 1, 6) [rad/s^k]; None at rest.
-    before
-        The motion in force then, if one is.
-
-    """
-
-    time: float
-    pose: FloatArray
-    jets: FloatArray | None = None
-    before: Motion | None = None
-
-
 class PlannerSession:
     """
     Answer goals with motions; a new one replaces what was planned from its start on.
@@ -200,7 +56,7 @@ class PlannerSession:
     def __init__(self, settings: SessionSettings) -> None:
         """Start at rest, without a measurement."""
         self.settings = settings
-        self._measured: JointSample | None = None
+        self._rest = RestStart()
         self._timeline = Timeline()
         self._motion: Motion | None = None
         self._ended: list[Ended] = []
@@ -229,10 +85,7 @@ class PlannerSession:
 
     def measure(self, sample: JointSample) -> None:
         """Take the measured state, in the order of the session's joints, unless it comes late."""
-        age = 0.0 if self._measured is None else self._measured.time - sample.time
-        # Far back is no late message, but a clock that was set back.
-        if not 0.0 < age <= self.settings.measurement_timeout:
-            self._measured = sample
+        self._rest.measure(sample, self.settings.measurement_timeout)
 
     def submit(self, goal: Goal, now: float, clock: Clock | None = None) -> Motion:
         """
@@ -259,9 +112,9 @@ class PlannerSession:
         _check_time(now)
         settings = self.settings
         target = rest_target(goal, settings.joints)
-        duration = self._checked_duration(target.duration)
+        duration = settings.checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
-        timed = self._planned(origin, target, duration)
+        timed = answer(settings, origin, target, duration)
         motion = Motion(
             plan_id=self._count + 1,
             plan=timed.plan,
@@ -299,7 +152,7 @@ class PlannerSession:
             raise RequestRejected(
                 Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
             )
-        limits = self._timing(origin.pose).limits
+        limits = self.settings.timing(origin.pose).limits
         remaining = running.end - origin.time
         planned = stop_plan(running.plan, origin.pose, origin.jets, remaining, limits)
         motion = Motion(
@@ -339,85 +192,6 @@ class PlannerSession:
         motion = self._timeline.at(now) or self._motion
         return None if motion is None else motion.reference(now)
 
-    def _checked_duration(self, prescribed: float | None) -> float | None:
-        """Return the duration of a goal, within its range; None for an automatic one."""
-        settings = self.settings
-        duration = settings.default_duration if prescribed is None else prescribed
-        if duration == 0.0:
-            if settings.limits is None or not settings.limits.bound_duration:
-                raise RequestRejected(
-                    Reason.DURATION_OUT_OF_RANGE,
-                    'the goal prescribes no duration, and no limit of a velocity or an effort '
-                    'makes one the shortest: set time_from_start in the goal, or one of the '
-                    'parameters duration.default, limits.velocity and limits.effort',
-                )
-            return None
-        if not settings.min_duration <= duration <= settings.max_duration:
-            below = duration < settings.min_duration
-            limit = settings.min_duration if below else settings.max_duration
-            raise RequestRejected(
-                Reason.DURATION_OUT_OF_RANGE,
-                f'duration {duration:g} s is outside [{settings.min_duration:g}, '
-                f'{settings.max_duration:g}] s',
-                value=duration,
-                limit=limit,
-            )
-        return duration
-
-    def _planned(self, origin: Origin, target: RestTarget, duration: float | None) -> TimedPlan:
-        """Return a plan within the limits that is good to the promised accuracy."""
-        arm, options = self.settings.arm, self.settings.options
-        if origin.jets is not None and origin.before is not None:
-            # What the arm is planned to do then is said in terms of the model it was planned with.
-            arm = origin.before.plan.task.arm
-            options = replace(options, flat_model=origin.before.plan.options.flat_model)
-
-        timing = self._timing(origin.pose)
-        timing.check_pose('the start', origin.pose)
-        for index, point in enumerate(target.via):
-            timing.check_pose(f'via point {index}', np.array(point.positions))
-        timing.check_pose('the final', np.array(target.positions))
-
-        def timed(request: MotionRequest) -> TimedPlan:
-            return timing.timed(lambda time: plan(request.stretched(time), arm, options), duration)
-
-        request = _request(target, origin, duration or NOMINAL_DURATION)
-        try:
-            if not target.chooses_times:
-                return timed(request)
-            found = timed(with_via_times(request, arm, options))
-            if duration is not None:
-                return found
-            # The best shares of the time depend on the time, if little.
-            return timed(with_via_times(found.plan.request, arm, options))
-        except InvalidRequest as error:
-            raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
-        except OutOfReach as error:
-            raise RequestRejected(
-                Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
-            ) from error
-        except UncertifiedPlan as error:
-            raise RequestRejected(
-                Reason.ILL_CONDITIONED,
-                f'no plan to the promised accuracy: {error}; use a longer duration or '
-                f'smaller weights',
-                value=error.residual,
-                limit=error.tolerance,
-            ) from error
-
-    def _timing(self, start: FloatArray) -> Timing:
-        """Return the rules for the duration of a motion from a pose."""
-        settings = self.settings
-        limits = settings.limits or JointLimits.of(settings.arm.n)
-        return Timing(
-            joints=settings.joints,
-            limits=limits.reaching(start, settings.position_tolerance),
-            on_violation=settings.on_violation,
-            # A motion shorter than the spacing of its samples would be none.
-            shortest=max(settings.min_duration, settings.period),
-            longest=min(settings.max_duration, LONGEST_FOUND),
-        )
-
     def _launched(
         self, motion: Motion, origin: Origin, stamp: float | None, clock: Clock | None
     ) -> Motion:
@@ -428,7 +202,7 @@ class PlannerSession:
             if stamp is None:
                 motion = replace(motion, start=now + settings.start_delay)
             elif stamp < now:
-                raise _too_late(stamp, now)
+                raise too_late(stamp, now)
         elif origin.time - now < HANDOVER * settings.lookahead and clock is not None:
             raise RequestRejected(
                 Reason.BUSY,
@@ -450,111 +224,19 @@ class PlannerSession:
         """Return where a motion starts."""
         settings = self.settings
         if stamp is not None and stamp < now:
-            raise _too_late(stamp, now)
+            raise too_late(stamp, now)
         if not self._timeline.is_busy(now):
             time = now + settings.start_delay if stamp is None else stamp
-            return Origin(time, np.array(self._start(now)))
+            reference = None if self._motion is None else self._motion.plan.request.final.tolist()
+            pose = self._rest.pose(settings, reference, now)
+            return Origin(time, np.array(pose))
         if not settings.is_stamped:
             raise RequestRejected(
                 Reason.BUSY,
                 'another motion is under way; none can take over from it as commands have no '
                 'stamp (command.stamp)',
             )
-        soonest = now + settings.lookahead
-        time = self._timeline.seam(soonest) if stamp is None else stamp
-        before = self._timeline.at(time)
-        if before is None:  # is_busy says otherwise
-            raise RequestRejected(Reason.INTERNAL, 'there is no motion to start from')
-        elapsed = time - before.start
-        if elapsed <= 0.0:
-            return Origin(time, before.plan.request.start, before=before)
-        if time >= before.end:
-            return Origin(time, before.plan.request.final, before=before)
-        if time < soonest:
-            raise RequestRejected(
-                Reason.OLD_HEADER_TIMESTAMP,
-                f'motion {before.plan_id} is under way: another one can take over from '
-                f'{soonest:.3f} s on (replan.lookahead), not at {time:.3f} s',
-                value=time,
-                limit=soonest,
-            )
-        times = np.array([elapsed])
-        return Origin(
-            time,
-            before.plan.at(times).positions[0],
-            before.plan.jets(times)[:, :CONDITIONS, 0],
-            before,
-        )
-
-    def _start(self, now: float) -> Sequence[float]:
-        """Return the start of a motion, checked against what is measured."""
-        settings = self.settings
-        source = settings.start_source
-        if source in (StartSource.AUTO, StartSource.MEASURED):
-            measured = self._fresh_measurement(now)
-            planned = [*measured.positions[:-1].tolist(), 0.0]
-        else:
-            if source is StartSource.PARAMETER:
-                planned = list(settings.start_position)
-            elif self._motion is not None:
-                planned = self._motion.plan.request.final.tolist()
-            else:
-                raise RequestRejected(
-                    Reason.START_STATE_UNKNOWN,
-                    'start.source is reference, but there has been no motion yet',
-                )
-            if self._measured is None:
-                return planned
-            measured = self._fresh_measurement(now)
-        self._check_at_rest(measured, planned)
-        return planned
-
-    def _fresh_measurement(self, now: float) -> JointSample:
-        """Return the measured state unless there is none, or only an old one."""
-        if self._measured is None:
-            raise RequestRejected(
-                Reason.START_STATE_UNKNOWN, 'no joint state of this arm has been received yet'
-            )
-        age, limit = now - self._measured.time, self.settings.measurement_timeout
-        if not -limit <= age <= limit:
-            raise RequestRejected(
-                Reason.START_STATE_STALE,
-                f'the last joint state is {age:.3f} s old, more than {limit:g} s'
-                if age > 0.0
-                else f'the last joint state is stamped {-age:.3f} s ahead of the present: do the '
-                f'planner and its source go by the same clock (use_sim_time)?',
-                value=age,
-                limit=limit,
-            )
-        return self._measured
-
-    def _check_at_rest(self, measured: JointSample, planned: Sequence[float]) -> None:
-        """Refuse to start from another place, or while the arm still moves."""
-        settings = self.settings
-        nothing = np.full(len(planned), np.nan)
-        velocities = nothing if measured.velocities is None else measured.velocities
-        for name, position, velocity, start in zip(
-            settings.joints, measured.positions, velocities, planned, strict=True
-        ):
-            # Written so that a NaN position is refused and a NaN velocity is not.
-            if not abs(position - start) <= settings.position_tolerance:
-                raise RequestRejected(
-                    Reason.START_STATE_MISMATCH,
-                    f'{name} is measured at {position:.4g} rad, not at the start {start:.4g} rad '
-                    f'(tolerance {settings.position_tolerance:g} rad)',
-                    joint=name,
-                    value=float(position),
-                    limit=settings.position_tolerance,
-                )
-            if abs(velocity) > settings.velocity_tolerance:
-                raise RequestRejected(
-                    Reason.NOT_AT_REST,
-                    f'{name} moves at {velocity:.4g} rad/s, more than '
-                    f'{settings.velocity_tolerance:g} rad/s',
-                    joint=name,
-                    value=float(velocity),
-                    limit=settings.velocity_tolerance,
-                )
+        return takeover(self._timeline, stamp, now + settings.lookahead)
 
 
 def _check_time(now: float) -> None:
@@ -564,33 +246,3 @@ def _check_time(now: float) -> None:
             Reason.START_STATE_UNKNOWN,
             'there is no time yet: use_sim_time is set, but no /clock has been received',
         )
-
-
-def _request(target: RestTarget, origin: Origin, duration: float) -> MotionRequest:
-    """Return what is asked of a plan; via times that are to be chosen are even for now."""
-    count = len(target.via) + 1
-    via = tuple(
-        ViaPoint(
-            time=duration * index / count if point.time is None else point.time,
-            values=np.array(planned_at_rest(np.array(point.positions))),
-        )
-        for index, point in enumerate(target.via, start=1)
-    )
-    return MotionRequest(
-        start=origin.pose,
-        final=np.array(target.positions),
-        duration=duration,
-        via=via,
-        start_jets=origin.jets,
-    )
-
-
-def _too_late(stamp: float, now: float) -> RequestRejected:
-    """Return the refusal of a start in the past."""
-    return RequestRejected(
-        Reason.OLD_HEADER_TIMESTAMP,
-        f'the stamp {stamp:.3f} s lies {now - stamp:.3f} s in the past; 0 means as soon as '
-        f'possible',
-        value=stamp,
-        limit=now,
-    )

@@ -46,7 +46,7 @@ GRIDS_KEPT = 32
 """Sampled unit motions in the cache."""
 
 MAX_KEPT_INTERVALS = 10_000
-"""Longest grid that is kept; with `GRIDS_KEPT` it bounds the cache to 18 MB."""
+"""Longest grid that is kept; with `GRIDS_KEPT` it bounds the caches to 24 MB."""
 
 
 _ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])

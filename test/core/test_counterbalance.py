@@ -75,6 +75,20 @@ def test_the_remedy_is_one(n):
         arm_with(links, mended['mass'], mended['arm']).check_flat()
 
 
+@pytest.mark.parametrize('n', SIZES)
+def test_an_arm_without_counterbalances_is_suggested_some(n):
+    links = links_of(n)
+    text = remedy(**links, counterbalance_mass=[0.0, 0.0], counterbalance_arm=[0.0, 0.0])
+    offers = dict(
+        (name, [float(x) for x in numbers])
+        for name, *numbers in re.findall(
+            r'counterbalance_(mass|arm) = \[([^,]+), ([^\]]+)\]', text
+        )
+    )
+    assert offers['arm'] == pytest.approx(links['link_length'][-2:] / 4)
+    arm_with(links, offers['mass'], offers['arm']).check_flat()
+
+
 def test_the_remedy_leaves_out_what_is_impossible():
     links = links_of(3)
     text = remedy(**links, counterbalance_mass=[0.5, 0.2], counterbalance_arm=[0.15, 0.0])

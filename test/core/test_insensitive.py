@@ -292,6 +292,39 @@ def test_any_arm(scale):
     assert result.optimality_residual < 1e-9
 
 
+@pytest.mark.parametrize('seed', range(40))
+def test_random_arms_and_wishes(seed):
+    rng = np.random.default_rng(seed)
+    last = 10.0 ** rng.uniform(-6.0, 0.0)
+    both = last * (1.0 + 10.0 ** rng.uniform(-2.0, 3.0))
+    frequency, ratio = 2.0 * np.pi * 10.0 ** rng.uniform(-1.0, 1.7), rng.choice([0.0, 0.01, 0.2])
+    series = last * (both - last) / both
+    arm = PlanarArm.reduced(
+        inertia_star=(both, last),
+        stiffness=series * frequency**2,
+        damping=2.0 * ratio * series * frequency,
+    )
+    duration = 2.0 * np.pi / frequency * 10.0 ** rng.uniform(-0.5, 2.0)
+    result, left = planned(
+        duration,
+        arm,
+        (2.0, 0.0),
+        box=UncertaintyBox(stiffness=rng.choice([0.0, 0.1, 0.3]), damping=rng.choice([0.0, 0.5])),
+        nominal=rng.choice(list(Nominal)),
+        criterion=rng.choice(list(Criterion)),
+        modes=int(rng.integers(6, 25)),
+        weight=10.0 ** rng.uniform(0.0, 4.0),
+    )
+    assert max(result.boundary_residual, result.optimality_residual) < 1e-9
+    assert result.rms_effort[0] >= least_effort(arm, 2.0, duration)
+    if result.options.insensitivity.nominal is Nominal.EXACT:
+        # What is left comes from joining samples linearly.
+        assert left.nominal < 1e-3 * max(left.worst, 0.01)
+    effort = result.rms_effort[0] / least_effort(arm, 2.0, duration)
+    assert result.cost_value >= effort**2 * (1.0 - 1e-9)
+    assert np.isfinite(left.worst)
+
+
 def test_bounds_hold_for_any_distance():
     for distance in (0.01, 1.0, 20.0):
         result, _ = planned(final=(distance, 0.0), max_effort_rms=0.004 * distance)

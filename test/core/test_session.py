@@ -11,7 +11,8 @@ from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import PlanningOptions
-from flat_planner_ros.core.session import Outcome, PlannerSession, SessionSettings, StartSource
+from flat_planner_ros.core.session import Outcome, PlannerSession
+from flat_planner_ros.core.session_settings import SessionSettings, StartSource
 from flat_planner_ros.core.simulation import SimulatedArm
 from flat_planner_ros.core.timing import OnViolation
 import numpy as np

@@ -10,7 +10,8 @@ from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
-from flat_planner_ros.core.session import PlannerSession, SessionSettings
+from flat_planner_ros.core.session import PlannerSession
+from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.timing import OnViolation, Timing
 import numpy as np
 import pytest

@@ -1,6 +1,7 @@
 """The interface document tells the truth about names, defaults and codes."""
 
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -29,3 +30,17 @@ def test_a_topic_or_service_is_documented(topic):
 @pytest.mark.parametrize('reason', interfaces.ERROR_CODES, ids=lambda reason: reason.name)
 def test_an_error_code_is_documented(reason):
     assert f'| {interfaces.ERROR_CODES[reason]} | `{reason.value}` |' in TEXT
+
+
+def test_the_derivation_lists_its_sections():
+    text = (DOCS / 'derivation.md').read_text('utf-8')
+    sections = re.findall(r'^## (\w) (.+)$', text, re.MULTILINE)
+    listed = re.findall(r'(\w)\. \[([^\]]+)\]\(#', text.partition('\n## ')[0])
+    assert len(sections) > 8
+    assert listed == sections
+
+
+def test_every_page_is_in_the_index():
+    pages = {page.stem for page in DOCS.iterdir() if page.suffix in ('.md', '.rst')} - {'index'}
+    index = (DOCS / 'index.md').read_text('utf-8')
+    assert pages <= set(index.split())

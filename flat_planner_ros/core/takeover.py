@@ -1,0 +1,91 @@
+"""Takeover: where a motion starts that follows another one without a step."""
+
+from typing import NamedTuple
+
+from flat_planner_ros.core.goal import Reason, RequestRejected
+from flat_planner_ros.core.solutions import CONDITIONS
+from flat_planner_ros.core.timeline import Motion, Timeline
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class Origin(NamedTuple):
+    """
+    Where a motion starts.
+
+    Attributes
+    ----------
+    time
+        Absolute [s].
+    pose
+        Angles of all joints, shape (n,) [rad].
+    jets
+        Derivatives 0 to 5 of the planned variables where the arm is planned to move then, shape
+        (n - 1, 6) [rad/s^k]; None at rest.
+    before
+        The motion in force then, if one is.
+
+    """
+
+    time: float
+    pose: FloatArray
+    jets: FloatArray | None = None
+    before: Motion | None = None
+
+
+def takeover(timeline: Timeline, stamp: float | None, soonest: float) -> Origin:
+    """
+    Return the start of a motion that takes over from what is planned.
+
+    Parameters
+    ----------
+    timeline
+        Busy: a motion is under way or waits for its start.
+    stamp
+        Absolute time at which it is to start [s]; None for as soon as possible.
+    soonest
+        Earliest time at which it can take over from a moving arm [s].
+
+    Raises
+    ------
+    RequestRejected
+        The arm moves then, and it is too soon.
+
+    """
+    time = timeline.seam(soonest) if stamp is None else stamp
+    before = timeline.at(time)
+    if before is None:  # is_busy says otherwise
+        raise RequestRejected(Reason.INTERNAL, 'there is no motion to start from')
+    elapsed = time - before.start
+    if elapsed <= 0.0:
+        return Origin(time, before.plan.request.start, before=before)
+    if time >= before.end:
+        return Origin(time, before.plan.request.final, before=before)
+    if time < soonest:
+        raise RequestRejected(
+            Reason.OLD_HEADER_TIMESTAMP,
+            f'motion {before.plan_id} is under way: another one can take over from '
+            f'{soonest:.3f} s on (replan.lookahead), not at {time:.3f} s',
+            value=time,
+            limit=soonest,
+        )
+    times = np.array([elapsed])
+    return Origin(
+        time,
+        before.plan.at(times).positions[0],
+        before.plan.jets(times)[:, :CONDITIONS, 0],
+        before,
+    )
+
+
+def too_late(stamp: float, now: float) -> RequestRejected:
+    """Return the refusal of a start in the past [s]."""
+    return RequestRejected(
+        Reason.OLD_HEADER_TIMESTAMP,
+        f'the stamp {stamp:.3f} s lies {now - stamp:.3f} s in the past; 0 means as soon as '
+        f'possible',
+        value=stamp,
+        limit=now,
+    )
