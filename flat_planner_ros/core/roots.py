@@ -363,7 +363,15 @@ def _is_conjugate_closed(squares: Sequence[complex]) -> bool:
 
 
 def _cluster(squares: Sequence[complex], is_imaginary: bool) -> Cluster | None:
-    """Return the representative of a group away from zero, None for the mirror image of one."""
+    """
+    Return the representative of a group away from zero, None for the mirror image of one.
+
+    Raises
+    ------
+    ArithmeticError
+        The group has come to lie at zero: next to others, its roots are lost in double precision.
+
+    """
     if not _is_conjugate_closed(squares):
         if sum(z.imag for z in squares) < 0.0:
             return None
@@ -375,5 +383,7 @@ def _cluster(squares: Sequence[complex], is_imaginary: bool) -> Cluster | None:
     else:
         roots = [sqrt(z) for z in squares]
         centre = complex(sum(root.real for root in roots) / len(roots))
+    if centre == 0.0:
+        raise ArithmeticError('the smallest characteristic roots are lost in double precision')
     factor = np.array(_monic(root - centre for root in roots))
     return Cluster(centre=centre, factor=factor)
