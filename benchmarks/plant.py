@@ -128,12 +128,15 @@ def _free_section() -> Section:
     for joints, target in SPEED_TARGETS.items():
         for executor in executors() if joints == 2 else executors()[:1]:
             speed, usage = _free_run(executor, joints)
-            rows.append((f'{joints}', executor, f'{speed:.3g}', f'{100.0 * usage.share:.0f} %'))
+            share = f'{100.0 * usage.share:.0f} %'
+            rows.append(
+                (f'{joints}', executor, f'{speed:.3g}', share, f'{speed / usage.share:.3g}')
+            )
             if executor == SHIPPED:
                 notes.append(f'{joints} joints, target {target:g}: {verdict(speed >= target)}')
     return Section(
         'Plant as fast as it can, 200 Hz of joint states and /clock, during a motion',
-        ('joints', 'executor', 'simulated s per s', 'CPU'),
+        ('joints', 'executor', 'simulated s per s', 'CPU', 'per s of CPU'),
         rows,
         notes,
     )

@@ -7,6 +7,7 @@ from flat_planner_ros.core.adoption import (
     ReportedEstimate,
 )
 from flat_planner_ros.core.arm import NaturalMode, PlanarArm
+from flat_planner_ros.core.assessment import load_libraries
 from flat_planner_ros.core.cost import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.counterbalance import (
     Counterbalances,
@@ -28,14 +29,7 @@ from flat_planner_ros.core.errors import (
 )
 from flat_planner_ros.core.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.flatness import flat_map, FlatMap, FlatModel
-from flat_planner_ros.core.goal import (
-    check_point_count,
-    Goal,
-    GoalPoint,
-    Reason,
-    RequestRejected,
-    rest_target,
-)
+from flat_planner_ros.core.goal import check_point_count, Goal, GoalPoint, rest_target
 from flat_planner_ros.core.identification import ActuatedJoints, identify, StiffnessEstimate
 from flat_planner_ros.core.insensitive import least_effort, rehearse
 from flat_planner_ros.core.insensitivity import (
@@ -60,6 +54,7 @@ from flat_planner_ros.core.planning import (
     PlanSamples,
     ViaPoint,
 )
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.robustness import (
     MAX_HALF_WIDTH,
     predict_residual,
@@ -125,6 +120,7 @@ __all__ = [
     'Level',
     'LimitUse',
     'LinkBody',
+    'load_libraries',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
     'MAX_WEIGHT',

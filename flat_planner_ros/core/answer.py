@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 from flat_planner_ros.core.errors import InvalidRequest, OutOfReach, UncertifiedPlan
-from flat_planner_ros.core.goal import Reason, RequestRejected, RestTarget
+from flat_planner_ros.core.goal import RestTarget
 from flat_planner_ros.core.planning import MotionRequest, plan, ViaPoint
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.request import planned_at_rest
 from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.takeover import Origin

@@ -143,6 +143,13 @@ def _rms_effort(times: Array, efforts: Array, joint: int, motion: PlannedMotion)
     return sqrt(_integral(squares, grid) / duration) if duration > 0.0 else None
 
 
+def load_libraries() -> None:
+    """Load what the first report needs: half a second's work that no sample should wait for."""
+    import scipy.fft
+    import scipy.integrate
+    import scipy.optimize  # noqa: F401  Loading is the purpose.
+
+
 def _integral(values: Array, grid: Array) -> float:
     """Return the integral of samples that are joined linearly."""
     from scipy.integrate import trapezoid  # here: slow to import, and only needed for a report

@@ -13,7 +13,7 @@ from flat_planner_ros.core.flatness import apply_row
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.quadrature import motion_quadrature
 from flat_planner_ros.core.solutions import CONDITIONS
-from flat_planner_ros.core.task import fractions, Task
+from flat_planner_ros.core.task import even_times, Task
 from flat_planner_ros.core.unit_motion import JET_ORDER
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -124,10 +124,11 @@ class RestToRest:
 
     def on_even_grid(self, intervals: int) -> Samples:
         """Return derivatives and torque at intervals + 1 even times."""
-        task, places = self.task, zip(self.distances, self.start, self.final, strict=True)
-        table = np.empty((len(self.distances), len(task.rates) + 1, intervals + 1))
-        unit = task.grid(intervals) if len(table) > 1 else None
-        for part, (distance, start, final) in zip(table, places, strict=True):
+        task, distances = self.task, self.distances
+        table = np.empty((len(distances), len(task.rates) + 1, intervals + 1))
+        unit = task.grid(intervals) if len(distances) > 1 else None
+        for i, distance in enumerate(distances):
+            part, start, final = table[i], self.start[i], self.final[i]
             if unit is None:
                 task.fill_grid(part, distance)
             else:
@@ -196,7 +197,7 @@ class FreeCourse:
 
     def on_even_grid(self, intervals: int) -> Samples:
         """Return derivatives and torque at intervals + 1 even times."""
-        planned = self.jets(self.task.duration * fractions(intervals))
+        planned = self.jets(even_times(self.task.duration, intervals))
         return Samples(planned, apply_row(self.task.flat_map.effort, planned[0]))
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:

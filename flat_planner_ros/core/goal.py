@@ -1,13 +1,12 @@
 """Goals as users send them, and the rules that an admissible one obeys (docs/interfaces.md)."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from math import isfinite
 from typing import NamedTuple
 
-from flat_planner_ros.core.errors import FlatPlannerError
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 
 MAX_ANGLE = 1e6
 """Largest joint angle of a goal [rad]: beyond, a motion drowns in the rounding of its position."""
@@ -17,73 +16,6 @@ MAX_POINTS = 51
 
 MAX_NAME = 64
 """Characters of a foreign name that a message repeats."""
-
-
-class Reason(Enum):
-    """Why a request is rejected; the names are those of the ROS interface."""
-
-    INVALID_GOAL = 'INVALID_GOAL'
-    INVALID_JOINTS = 'INVALID_JOINTS'
-    OLD_HEADER_TIMESTAMP = 'OLD_HEADER_TIMESTAMP'
-    EMPTY_GOAL = 'EMPTY_GOAL'
-    NON_FINITE = 'NON_FINITE'
-    SIZE_MISMATCH = 'SIZE_MISMATCH'
-    TIME_NOT_INCREASING = 'TIME_NOT_INCREASING'
-    NONZERO_END_STATE = 'NONZERO_END_STATE'
-    PASSIVE_JOINT_NOT_ZERO = 'PASSIVE_JOINT_NOT_ZERO'
-    EFFORT_NOT_ALLOWED = 'EFFORT_NOT_ALLOWED'
-    POSITION_LIMIT = 'POSITION_LIMIT'
-    VELOCITY_LIMIT = 'VELOCITY_LIMIT'
-    EFFORT_LIMIT = 'EFFORT_LIMIT'
-    DURATION_OUT_OF_RANGE = 'DURATION_OUT_OF_RANGE'
-    START_STATE_UNKNOWN = 'START_STATE_UNKNOWN'
-    START_STATE_STALE = 'START_STATE_STALE'
-    START_STATE_MISMATCH = 'START_STATE_MISMATCH'
-    NOT_AT_REST = 'NOT_AT_REST'
-    SOLVER_FAILED = 'SOLVER_FAILED'
-    ILL_CONDITIONED = 'ILL_CONDITIONED'
-    BUSY = 'BUSY'
-    INTERNAL = 'INTERNAL'
-
-
-class RequestRejected(FlatPlannerError):
-    """
-    A request that is answered with a refusal.
-
-    Attributes
-    ----------
-    reason
-        The rule that it breaks.
-    joint
-        The joint concerned, if one is.
-    value, limit
-        What was found and what is allowed, in SI units, where the rule has numbers.
-    time
-        Where in the motion [s], if it matters.
-    duration_min
-        Shortest duration that would be accepted, where that is the remedy [s].
-
-    """
-
-    def __init__(
-        self,
-        reason: Reason,
-        message: str,
-        *,
-        joint: str | None = None,
-        value: float | None = None,
-        limit: float | None = None,
-        time: float | None = None,
-        duration_min: float | None = None,
-    ) -> None:
-        """Keep the numbers apart from the sentence."""
-        super().__init__(message)
-        self.reason = reason
-        self.joint = joint
-        self.value = value
-        self.limit = limit
-        self.time = time
-        self.duration_min = duration_min
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,38 +218,40 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
 
 def _check_rest(goal: Goal, final: GoalPoint) -> None:
     """Refuse an end in motion."""
-    for quantity, values in _derivatives(final):
-        for name, value in zip(goal.joint_names, values, strict=False):
-            if value != 0.0:
-                raise RequestRejected(
-                    Reason.NONZERO_END_STATE,
-                    f'the motion must end at rest, but the final {quantity} of {name} is '
-                    f'{value:g}; leave it out or set it to 0',
-                    joint=name,
-                    value=value,
-                    limit=0.0,
-                )
+    for quantity, name, value in _moving(goal, final):
+        raise RequestRejected(
+            Reason.NONZERO_END_STATE,
+            f'the motion must end at rest, but the final {quantity} of {name} is {value:g}; '
+            f'leave it out or set it to 0',
+            joint=name,
+            value=value,
+            limit=0.0,
+        )
 
 
 def _check_only_passed(goal: Goal, point: GoalPoint) -> None:
     """Refuse velocities and accelerations of via points, which the planner chooses."""
-    for quantity, values in _derivatives(point):
+    for quantity, name, value in _moving(goal, point):
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'via points prescribe positions only, but there the {quantity} of {name} is '
+            f'{value:g}; leave it out, the planner chooses it',
+            joint=name,
+            value=value,
+            limit=0.0,
+            time=point.time,
+        )
+
+
+def _moving(goal: Goal, point: GoalPoint) -> Iterator[tuple[str, str, float]]:
+    """Yield the quantity, joint and value of every derivative of a point that is not zero."""
+    for quantity, values in (
+        ('velocity', point.velocities),
+        ('acceleration', point.accelerations),
+    ):
         for name, value in zip(goal.joint_names, values, strict=False):
             if value != 0.0:
-                raise RequestRejected(
-                    Reason.INVALID_GOAL,
-                    f'via points prescribe positions only, but there the {quantity} of {name} is '
-                    f'{value:g}; leave it out, the planner chooses it',
-                    joint=name,
-                    value=value,
-                    limit=0.0,
-                    time=point.time,
-                )
-
-
-def _derivatives(point: GoalPoint) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return what a point says of the motion, by name."""
-    return ('velocity', point.velocities), ('acceleration', point.accelerations)
+                yield quantity, name, value
 
 
 def _angles(goal: Goal, point: GoalPoint, joints: Sequence[str]) -> tuple[float, ...]:

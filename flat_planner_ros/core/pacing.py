@@ -138,8 +138,8 @@ class PacedArm:
         Raises
         ------
         InvalidCommand
-            If it has ended, does not suit the arm or is elsewhere by now, or if the arm has been
-            stopped. The present command then goes on.
+            If it has ended, was overtaken, does not suit the arm or is elsewhere by now, or if the
+            arm has been stopped. The present command then goes on.
 
         """
         now = self.time
@@ -148,6 +148,7 @@ class PacedArm:
                 f'it ended at {profile.end:.6f} s, {now - profile.end:.3f} s before the present '
                 f'{now:.6f} s'
             )
+        self._refuse_overtaken(profile, now)
         self._refuse_jump(profile, now)
         self._play(profile)
         ahead = profile.start - now
@@ -280,6 +281,16 @@ class PacedArm:
         shifted = replace(profile, start=profile.start - self._offset)
         self._simulated.command(shifted, self._simulated.time)
         self._profile = profile
+
+    def _refuse_overtaken(self, profile: EffortProfile, now: float) -> None:
+        """Refuse a command that was made before the running one and arrives after it."""
+        running = self._profile
+        # One that has not begun may well be replaced by an earlier one.
+        if running is not None and profile.start < running.start <= now < running.end:
+            raise InvalidCommand(
+                f'it was overtaken: it starts {running.start - profile.start:.6f} s before the '
+                'running one'
+            )
 
     def _refuse_jump(self, profile: EffortProfile, now: float) -> None:
         """Refuse a command that asks the arm to be elsewhere than it is or has been sent."""

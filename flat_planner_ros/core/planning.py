@@ -1,6 +1,6 @@
 """Plan: a goal turned into certified motion laws, joint motion and feed-forward effort."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, inf
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from flat_planner_ros.core.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.shaped_course import shaped_course
-from flat_planner_ros.core.task import fractions, Task, task_of
+from flat_planner_ros.core.task import even_times, Task, task_of
 from flat_planner_ros.core.via_points import optimal_path
 from flat_planner_ros.core.via_times import path_of
 import numpy as np
@@ -49,8 +49,11 @@ class Plan:
 
     Attributes
     ----------
-    request, options
+    request
         What was asked for.
+    options
+        How it was planned: as asked for, but with the strategy polynomial in place of insensitive
+        where the start is in motion.
     task
         What plans of the same arm, cost and duration share.
     course
@@ -123,7 +126,7 @@ class Plan:
         """
         intervals = max(1, ceil(self.duration / period - SPACING_TOLERANCE))
         planned, torque = self.course.on_even_grid(intervals)
-        return self._samples(self.duration * fractions(intervals), planned, torque)
+        return self._samples(even_times(self.duration, intervals), planned, torque)
 
     def at(self, times: FloatArray) -> PlanSamples:
         """
@@ -275,6 +278,9 @@ def _from_motion(
     request: MotionRequest, options: PlanningOptions, task: Task, start: FloatArray
 ) -> Plan:
     """Return a plan whose planned variables have given derivatives at the start."""
+    if options.strategy is Strategy.INSENSITIVE:
+        # It has no law from a start in motion; the task's cost is the polynomial one.
+        options = replace(options, strategy=Strategy.POLYNOMIAL)
     final = np.array(planned_at_rest(request.final))
     with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
         found = laws_to_rest(task, start, final)

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from flat_planner_ros.core.goal import Reason, RequestRejected
 from flat_planner_ros.core.motion_record import JointSample
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.session_settings import SessionSettings, StartSource
 import numpy as np
 
@@ -14,6 +14,11 @@ class RestStart:
     def __init__(self) -> None:
         """Know no measurement."""
         self._measured: JointSample | None = None
+
+    @property
+    def measured(self) -> JointSample | None:
+        """Return the last measured state, None before the first."""
+        return self._measured
 
     def measure(self, sample: JointSample, timeout: float) -> None:
         """

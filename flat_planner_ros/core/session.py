@@ -6,9 +6,10 @@ from enum import Enum
 from typing import NamedTuple
 
 from flat_planner_ros.core.answer import answer
-from flat_planner_ros.core.goal import Goal, Reason, RequestRejected, rest_target
+from flat_planner_ros.core.goal import Goal, rest_target
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.plan_samples import PlanSamples
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.rest_start import RestStart
 from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.stopping import stop_plan
@@ -83,6 +84,11 @@ class PlannerSession:
             raise RequestRejected(Reason.EMPTY_GOAL, 'no goal has been accepted yet')
         return self._last_goal
 
+    @property
+    def measured(self) -> JointSample | None:
+        """Return the last measured state, None before the first."""
+        return self._rest.measured
+
     def measure(self, sample: JointSample) -> None:
         """Take the measured state, in the order of the session's joints, unless it comes late."""
         self._rest.measure(sample, self.settings.measurement_timeout)
@@ -115,6 +121,7 @@ class PlannerSession:
         duration = settings.checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
         timed = answer(settings, origin, target, duration)
+        wanted = settings.options.strategy
         motion = Motion(
             plan_id=self._count + 1,
             plan=timed.plan,
@@ -123,6 +130,7 @@ class PlannerSession:
             planned_at=now,
             duration_min=timed.duration_min,
             exceeded=timed.exceeded,
+            replaced_strategy=None if timed.plan.options.strategy is wanted else wanted,
         )
         motion = self._launched(motion, origin, goal.stamp, clock)
         self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)

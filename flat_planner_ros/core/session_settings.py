@@ -6,8 +6,8 @@ from math import inf
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.goal import Reason, RequestRejected
 from flat_planner_ros.core.limits import JointLimits
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.request import PlanningOptions
 from flat_planner_ros.core.timing import OnViolation, Timing
 import numpy as np

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.goal import Reason, RequestRejected
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.timeline import Motion, Timeline
 import numpy as np

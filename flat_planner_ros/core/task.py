@@ -152,17 +152,18 @@ def _fill(task: Task, table: FloatArray, distance: float) -> None:
 _kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
 
 
-def fractions(intervals: int) -> FloatArray:
-    """Return even fractions of the duration, both ends exact, read-only, shape (m,)."""
-    return (_fractions if intervals > MAX_KEPT_INTERVALS else _kept_fractions)(intervals)
+def even_times(duration: float, intervals: int) -> FloatArray:
+    """Return even times of a motion, both ends exact, read-only, shape (m,) [s]."""
+    return (_times if intervals > MAX_KEPT_INTERVALS else _kept_times)(duration, intervals)
 
 
-def _fractions(intervals: int) -> FloatArray:
-    """Return even fractions of the duration."""
-    fractions = np.arange(intervals + 1.0)
-    fractions /= intervals
-    fractions.setflags(write=False)
-    return fractions
+def _times(duration: float, intervals: int) -> FloatArray:
+    """Return even times of a motion."""
+    times = np.arange(intervals + 1.0)
+    times /= intervals
+    times *= duration
+    times.setflags(write=False)
+    return times
 
 
-_kept_fractions = lru_cache(maxsize=GRIDS_KEPT)(_fractions)
+_kept_times = lru_cache(maxsize=GRIDS_KEPT)(_times)

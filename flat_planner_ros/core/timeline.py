@@ -10,6 +10,7 @@ seam (docs/derivation.md, section S).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.limits import LimitUse
 from flat_planner_ros.core.plan_samples import PlanSamples
 from flat_planner_ros.core.planning import Plan
@@ -47,6 +48,8 @@ class Motion:
         Shortest duration within the limits, where it was looked for [s].
     exceeded
         What the prescribed duration would have exceeded, if the motion was stretched.
+    replaced_strategy
+        The strategy that was asked for, where the plan had to take another one.
 
     """
 
@@ -59,6 +62,7 @@ class Motion:
     stops: bool = False
     duration_min: float | None = None
     exceeded: LimitUse | None = None
+    replaced_strategy: Strategy | None = None
 
     @property
     def end(self) -> float:

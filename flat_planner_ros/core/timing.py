@@ -6,9 +6,9 @@ from enum import Enum
 
 from flat_planner_ros.core.duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.extrema import Quantity
-from flat_planner_ros.core.goal import Reason, RequestRejected
 from flat_planner_ros.core.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning import Plan
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 import numpy as np
 from numpy.typing import NDArray
 

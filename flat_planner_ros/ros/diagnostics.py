@@ -113,6 +113,9 @@ def accepted_status(
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
         values.update(_per_joint(quantity, joints, getattr(plan, quantity).tolist()))
     level = DiagnosticStatus.OK
+    if motion.replaced_strategy is not None:
+        level = DiagnosticStatus.WARN
+        message += f'; not {motion.replaced_strategy.value}, which only plans from rest'
     if motion.exceeded is not None:
         use = motion.exceeded
         level, name = DiagnosticStatus.WARN, joints[use.joint]

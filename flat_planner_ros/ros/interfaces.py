@@ -39,6 +39,9 @@ REPORT_NAME = 'flat_monitor: residual oscillation'
 RELIABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Goals, commands and joint states: nothing is lost, nothing is kept for latecomers."""
 
+BURST = QoSProfile(depth=256, reliability=ReliabilityPolicy.RELIABLE)
+"""Goals as the planner hears them: as many may wait for their verdicts."""
+
 LATCHED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,

@@ -6,6 +6,7 @@ import sys
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import (
     FlatPlannerError,
+    load_libraries,
     MonitorSettings,
     PlannedMotion,
     VibrationMonitor,
@@ -25,6 +26,9 @@ from trajectory_msgs.msg import JointTrajectory
 
 TICK_PERIOD = 0.1
 """Time between two looks for silence [s]."""
+
+LOADING_DELAY = 0.1
+"""Time from the node's start after which it answers and may load libraries [s]."""
 
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two messages on `/diagnostics` [s]."""
@@ -62,6 +66,12 @@ class MonitorNode(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
+        self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
+
+    def _on_loading(self) -> None:
+        """Load what the first report needs, once, before there is anything to report."""
+        self._loading.cancel()
+        load_libraries()
 
     def _now(self) -> float:
         """Return the node's time [s]."""

@@ -7,20 +7,18 @@ from time import perf_counter
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import (
-    AdoptionRefused,
     FlatPlannerError,
     Goal,
-    ModelTuner,
     PlannerSession,
     Reason,
     RequestRejected,
-    Track,
 )
 from flat_planner_ros.ros import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.effort_stream import EffortStream
 from flat_planner_ros.ros.graph_watch import GraphWatch
+from flat_planner_ros.ros.model_adoption import ModelAdoption
 from flat_planner_ros.ros.node_runner import run
-from flat_planner_ros.ros.parameters import model_parameters, NodeParameters
+from flat_planner_ros.ros.parameters import NodeParameters
 from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -47,8 +45,7 @@ class PlannerNode(Node):
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
-        self._tuner = ModelTuner()
-        self._sent: Track | None = None
+        self._sent_start: float | None = None
         publish = self.create_publisher
         self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
@@ -63,11 +60,11 @@ class PlannerNode(Node):
             (JointTrajectory, interfaces.GOAL, self._on_goal),
             (JointState, interfaces.GOAL_STATE, self._on_goal_state),
         ):
-            listen(kind, topic, heard, interfaces.RELIABLE, raw=True)
+            listen(kind, topic, heard, interfaces.BURST, raw=True)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
-        report = interfaces.of(interfaces.MONITOR, interfaces.REPORT)
-        listen(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
-        self.create_service(Trigger, interfaces.ADOPT, self._on_adopt)
+        self._adoption = ModelAdoption(
+            self, lambda: self._settings, lambda: self._sent_start, self._publish_status
+        )
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
         self.create_service(Trigger, interfaces.STOP, self._on_stop)
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
@@ -127,46 +124,6 @@ class PlannerNode(Node):
             self.get_logger().warning(
                 f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
             )
-
-    def _on_report(self, msg: DiagnosticArray) -> None:
-        """Keep an estimate, and adopt it at once if it follows the own last motion and may be."""
-        try:
-            estimate = diagnostics.reported_estimate(msg)
-        except FlatPlannerError as error:
-            self.get_logger().warning(f'report ignored: {error}')
-            return
-        if estimate is None:
-            return
-        self._tuner.hear(estimate)
-        sent = self._sent
-        if self._settings.auto_tune and sent is not None and estimate.is_of(sent.start):
-            try:
-                self._adopt()
-            except AdoptionRefused as refusal:
-                self.get_logger().info(f'auto_tune: {refusal}')
-
-    def _on_adopt(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Adopt the last trustworthy estimate."""
-        try:
-            response.message = self._adopt().message
-            response.success = True
-        except AdoptionRefused as refusal:
-            response.message = str(refusal)
-            response.success = False
-        return response
-
-    def _adopt(self) -> DiagnosticStatus:
-        """Set the parameters of the model to the last estimate, for the next plan."""
-        session = self._settings.session
-        adoption = self._tuner.propose(session.arm, session.joints[-1])
-        values = {'stiffness': adoption.arm.stiffness, 'damping': adoption.arm.damping}
-        result = self.set_parameters_atomically(model_parameters(**values))
-        if not result.successful:
-            raise AdoptionRefused(f'the parameters refuse the estimate: {result.reason}')
-        self._tuner.confirm(adoption)
-        status = diagnostics.adopted_status(adoption)
-        self._publish_status(status)
-        return status
 
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Plan the last goal again."""
@@ -239,7 +196,8 @@ class PlannerNode(Node):
     def _publish_motion(self) -> None:
         """Publish all that is still to be carried out, the command first: its start is near."""
         settings = self._settings
-        track = self._sent = self._session.track(self._now())
+        track = self._session.track(self._now())
+        self._sent_start = track.start
         plan = conversions.command_bytes(track, self._joints)
         if settings.session.execute:
             is_whole = settings.include_passive_joint and settings.include_effort

@@ -4,15 +4,8 @@ from dataclasses import replace
 from itertools import pairwise
 from math import inf, nan, pi
 
-from flat_planner_ros.core.goal import (
-    Goal,
-    GoalPoint,
-    MAX_ANGLE,
-    MAX_POINTS,
-    Reason,
-    RequestRejected,
-    rest_target,
-)
+from flat_planner_ros.core.goal import Goal, GoalPoint, MAX_ANGLE, MAX_POINTS, rest_target
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

@@ -257,6 +257,17 @@ def test_a_command_that_has_ended_is_refused_and_the_present_one_goes_on():
     assert np.array_equal(last(lead_to(arm, 4.0)), last(lead_to(undisturbed, 4.0)))
 
 
+def test_a_command_that_was_overtaken_is_refused_and_the_running_one_goes_on():
+    arm, undisturbed = moving(), moving()
+    with pytest.raises(InvalidCommand, match=r'overtaken: it starts 0\.050000 s before'):
+        arm.command(swing(1.2))
+    assert arm.command(swing(1.25)) != ''  # the same once more is no matter
+    assert np.array_equal(last(lead_to(arm, 4.0)), last(lead_to(undisturbed, 4.0)))
+    arm = PacedArm(SETTINGS, 1.0)
+    arm.command(swing(5.0))
+    assert arm.command(swing(2.0)) == '', 'one that waits gives way to an earlier one'
+
+
 def test_a_command_that_begins_after_a_skipped_time_is_kept():
     arm, start = PacedArm(SETTINGS), 10.0
     arm.follow(1.0)

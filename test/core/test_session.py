@@ -7,10 +7,11 @@ from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
-from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
+from flat_planner_ros.core.goal import Goal, GoalPoint
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
-from flat_planner_ros.core.planning import PlanningOptions
+from flat_planner_ros.core.planning import plan, PlanningOptions
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.session import Outcome, PlannerSession
 from flat_planner_ros.core.session_settings import SessionSettings, StartSource
 from flat_planner_ros.core.simulation import SimulatedArm
@@ -127,6 +128,24 @@ def test_the_insensitive_strategy_refuses_via_points():
     error = reason_of(session(options=options).submit, VIA, NOW)
     assert error.reason is Reason.INVALID_GOAL
     assert 'insensitive' in str(error)
+
+
+def test_a_plan_says_by_which_strategy_it_was_really_planned():
+    options = PlanningOptions(strategy=Strategy.INSENSITIVE)
+    planner = session(options=options)
+    first = planner.submit(GOAL, NOW)
+    assert first.plan.options.strategy is Strategy.INSENSITIVE
+    assert first.replaced_strategy is None
+    second = planner.submit(BACK, NOW + 0.4)
+    assert second.plan.options.strategy is Strategy.POLYNOMIAL
+    assert second.replaced_strategy is Strategy.INSENSITIVE
+    plain = PlanningOptions(strategy=Strategy.POLYNOMIAL)
+    same = plan(second.plan.request, SETTINGS.arm, plain)
+    assert (same.sample(0.01).efforts == second.plan.sample(0.01).efforts).all()
+    # At rest again, between the end of a motion and the start of one that waits.
+    third = planner.submit(replace(GOAL, stamp=second.end + 1.0), NOW + 0.8)
+    assert third.plan.options.strategy is Strategy.INSENSITIVE
+    assert third.replaced_strategy is None
 
 
 def test_via_points_of_a_start_in_motion():

@@ -6,10 +6,11 @@ from math import inf, pi
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.extrema import extrema_of, Quantity
-from flat_planner_ros.core.goal import Goal, GoalPoint, Reason, RequestRejected
+from flat_planner_ros.core.goal import Goal, GoalPoint
 from flat_planner_ros.core.limits import JointLimits
 from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
+from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.session import PlannerSession
 from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.timing import OnViolation, Timing

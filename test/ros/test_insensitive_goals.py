@@ -2,7 +2,7 @@
 
 from math import pi
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm, rollout
 from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
@@ -36,6 +36,7 @@ class Planner:
         self.graph.publish('/flat_planner/goal', message)
         self.graph.expect(lambda: len(self.status) > before, 'a verdict')
         status = self.status[before].status[0]
+        self.level = status.level
         return {**{pair.key: pair.value for pair in status.values}, 'message': status.message}
 
     def command(self):
@@ -97,6 +98,18 @@ def test_bounds_are_kept_or_the_goal_is_rejected(graph):
     assert verdict['error_name'] == 'SOLVER_FAILED'
     assert float(verdict['value']) > float(verdict['limit']) == 0.02
     assert 'longer duration' in verdict['message']
+
+
+def test_a_start_in_motion_says_what_is_planned_instead(graph):
+    planner = Planner(graph, strategy='insensitive', execute=True, **{'replan.lookahead': 1.0})
+    verdict = planner.send(duration=4.0)
+    assert planner.level == DiagnosticStatus.OK
+    assert verdict['strategy'] == 'insensitive'
+    verdict = planner.send(angle=1.0, duration=4.0)
+    assert planner.level == DiagnosticStatus.WARN
+    assert verdict['strategy'] == 'polynomial'
+    assert verdict['message'].startswith('plan 2: polynomial, 4 s')
+    assert 'not insensitive, which only plans from rest' in verdict['message']
 
 
 @pytest.mark.parametrize(

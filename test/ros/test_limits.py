@@ -40,7 +40,7 @@ class Planner:
         state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
         state.header.stamp = self.node.get_clock().now().to_msg()
         graph.publish('joint_states', state)
-        graph.expect(lambda: self.node._session._measured is not None, 'the measured state')
+        graph.expect(lambda: self.node._session.measured is not None, 'the measured state')
 
     def send(self, angle=pi, duration=0.0):
         """Send a goal and return the verdict and its values."""

@@ -36,11 +36,11 @@ INSENSITIVE = 0.012
 LEARNT = 0.02
 """Largest amplitude after self-tuning, as a share of that before."""
 
-EXPERIMENT_TIMEOUT = 240.0
+EXPERIMENT_TIMEOUT = 400.0
 """Twenty motions at several times real time take about 45 s on two free cores [s]."""
 
 
-@pytest.mark.timeout(280)
+@pytest.mark.timeout(440)
 def test_the_whole_experiment_gives_the_verified_numbers(graph, tmp_path):
     table, figure = tmp_path / 'table.csv', tmp_path / 'figures.png'
     process = graph.start('paper_table', '--beyond', '--csv', str(table), '--plot', str(figure))

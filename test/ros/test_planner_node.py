@@ -45,7 +45,7 @@ class Planner:
         stamp = conversions.seconds(state.header.stamp)
 
         def has_arrived() -> bool:
-            sample = self.node._session._measured
+            sample = self.node._session.measured
             return sample is not None and sample.time == stamp
 
         self.graph.expect(has_arrived, 'the measured state')
@@ -419,7 +419,7 @@ def test_namespaces_and_remappings_hold(graph):
     state = JointState(name=['joint1', 'joint2'], position=[0.2, 0.0])
     state.header.stamp = conversions.time_msg(planner.now())
     graph.publish('/left/measured', state)
-    graph.expect(lambda: planner.node._session._measured is not None, 'the measured state')
+    graph.expect(lambda: planner.node._session.measured is not None, 'the measured state')
     assert planner.send(goal())['state'] == 'ACCEPTED'
 
 

@@ -174,7 +174,7 @@ class Goals:
         state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
         state.header.stamp = conversions.time_msg(now_of(self.planner))
         graph.publish('/joint_states', state)
-        graph.expect(lambda: self.planner._session._measured is not None, 'the measured state')
+        graph.expect(lambda: self.planner._session.measured is not None, 'the measured state')
         self.publisher = graph.probe.create_publisher(JointTrajectory, '/flat_planner/goal', 10)
         graph.expect(self.publisher.get_subscription_count, 'the planner on its goals')
         self.slowest = 0.0
