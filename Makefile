@@ -28,12 +28,12 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test fuzz bench docs examples lint install clean FORCE
+.PHONY: help demo test fuzz soak bench docs examples lint install clean FORCE
 .DELETE_ON_ERROR:
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
-	@echo 'ARGS="..." is added to the command line of demo, test, fuzz and bench; PYTHON=... chooses the interpreter.'
+	@echo 'ARGS="..." is added to the command line of demo, test, fuzz, soak and bench; PYTHON=... chooses the interpreter.'
 
 demo: install  ## the paper's experiment on the three nodes: table, figures and numbers in build/
 	@mkdir -p build
@@ -48,6 +48,10 @@ fuzz: export FUZZ_CASES ?= 100000
 fuzz: export RANDOM_MESSAGES ?= 10000
 fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
 	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/test_random_messages.py $(ARGS)
+
+soak: export PYTHONUNBUFFERED := 1
+soak: install  ## random motions with faults for a long time, MINUTES=30 by default
+	$(BIN)/python test/soak/run.py --minutes $(or $(MINUTES),30) $(ARGS)
 
 bench: install $(PEERS)  ## speed beside other libraries, and of the nodes; benchmarks/results.md
 	$(BIN)/python benchmarks/run.py $(ARGS)

@@ -61,8 +61,9 @@ def takeover(timeline: Timeline, stamp: float | None, soonest: float) -> Origin:
     if before is None:  # is_busy says otherwise
         raise RequestRejected(Reason.INTERNAL, 'there is no motion to start from')
     elapsed = time - before.start
-    if elapsed <= 0.0:
-        return Origin(time, before.plan.request.start, before=before)
+    request = before.plan.request
+    if elapsed < 0.0 or (elapsed == 0.0 and request.start_jets is None):
+        return Origin(time, request.start, before=before)
     if time >= before.end:
         return Origin(time, before.plan.request.final, before=before)
     if time < soonest:
@@ -73,6 +74,10 @@ def takeover(timeline: Timeline, stamp: float | None, soonest: float) -> Origin:
             value=time,
             limit=soonest,
         )
+    if (
+        elapsed == 0.0
+    ):  # Two goals within one period of the command: the later one takes its place.
+        return Origin(time, request.start, request.start_jets, before)
     times = np.array([elapsed])
     return Origin(
         time,

@@ -16,7 +16,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import get_default_context, remove_ros_args
 
 EXECUTOR = 'FLAT_PLANNER_EXECUTOR'
 """Environment variable: `events`, the default where ROS has it, or `single`."""
@@ -30,6 +30,12 @@ HINTS = {
 
 SOURCE_PLACE = re.compile(r',? at /\S+:\d+')
 """Where in its own sources rcl has met an error."""
+
+NO_LOGGING = 'failed to initialize logging'
+"""What rcl says where the directory of the log files cannot be made."""
+
+WITHOUT_LOG_FILE = ('--ros-args', '--disable-external-lib-logs')
+"""Arguments by which a process logs to the console and to /rosout only."""
 
 RCL = 'rcl'
 """Logger of the client library below rclpy."""
@@ -102,7 +108,19 @@ def _init(args: Sequence[str] | None) -> None:
     """Open the default context; complaints come as exceptions alone, not as log entries too."""
     set_logger_level(RCL, LoggingSeverity.FATAL)
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        except RuntimeError as error:
+            if NO_LOGGING not in str(error):
+                raise
+            # A disk that cannot be written is no reason to stand still: the console and /rosout
+            # have the log as well.
+            print(f'no log file: {SOURCE_PLACE.sub("", str(error))}', file=sys.stderr)
+            get_default_context(shutting_down=True)  # The next one is new: none is opened twice.
+            rclpy.init(
+                args=[*(sys.argv if args is None else args), *WITHOUT_LOG_FILE],
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
     finally:
         if get_logger_level(RCL) == LoggingSeverity.FATAL:  # not what --log-level has asked for
             set_logger_level(RCL, LoggingSeverity.UNSET)

@@ -263,6 +263,22 @@ def test_a_stop_is_planned_wherever_the_arm_is():
     assert planner.stop(now).stops
 
 
+def test_two_goals_within_a_period_of_the_command_take_over_at_the_same_time():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    overtaken = planner.submit(BACK, first.start + 0.3012)
+    motion = planner.submit(replace(GOAL, stamp=None), first.start + 0.3018)
+    assert motion.start == overtaken.start
+    assert motion.samples.positions[0, 1] != 0.0
+    at = np.array([motion.start - first.start])
+    assert motion.samples.positions[0] == pytest.approx(first.plan.at(at).positions[0], abs=1e-12)
+    assert motion.samples.efforts[0] == pytest.approx(first.plan.at(at).efforts[0], abs=1e-9)
+    assert motion.samples.positions[-1].tolist() == [pi, 0.0]
+    too_soon = replace(BACK, stamp=motion.start)
+    error = reason_of(planner.submit, too_soon, motion.start - 0.5 * SETTINGS.lookahead)
+    assert error.reason is Reason.OLD_HEADER_TIMESTAMP
+
+
 def test_what_is_being_played_stays_as_it_is():
     planner = session()
     first = planner.submit(GOAL, NOW)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import signal
@@ -289,9 +289,9 @@ class Graph:
         )
 
 
-@pytest.fixture(scope='session')
-def ros_domain() -> Iterator[int]:
-    """Return a domain that no other process of tests on this machine uses."""
+@contextmanager
+def free_domain() -> Iterator[int]:
+    """Lend a domain that no other process of tests on this machine uses."""
     first = os.getpid() % len(DOMAINS)
     taken = os.environ.get('ROS_DOMAIN_ID', '')
     with socket.socket() as lock:
@@ -299,9 +299,17 @@ def ros_domain() -> Iterator[int]:
             with suppress(OSError):
                 if str(domain) != taken:
                     lock.bind(('127.0.0.1', LOCK_PORT + domain))
-                    yield domain
-                    return
-        pytest.fail(f'all domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use')
+                    break
+        else:
+            pytest.fail(f'all domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use')
+        yield domain
+
+
+@pytest.fixture(scope='session')
+def ros_domain() -> Iterator[int]:
+    """Return the domain of this process of tests."""
+    with free_domain() as domain:
+        yield domain
 
 
 @pytest.fixture

@@ -1,0 +1,46 @@
+"""Nodes killed and started again in the midst of a motion: nothing moves by itself."""
+
+import numpy as np
+import pytest
+from ros.world import NODES, stamp, World
+
+
+def test_a_monitor_killed_in_a_motion_reports_it_after_its_restart(graph):
+    world = World(graph, *NODES)
+    world.move(1.0, 8.0)
+    world.wait_until(world.begin + 1.0)
+    world.kill('monitor_node')
+    world.start('monitor_node')
+    amplitude = world.amplitude()
+    assert amplitude < 1e-5 or world.is_said_to_be_late()
+
+
+def test_all_nodes_killed_in_a_motion_start_at_rest_and_stay_there(graph):
+    world = World(graph, *NODES)
+    world.move(1.0, 6.0)
+    world.wait_until(world.begin + 2.0)
+    assert world.efforts().any()
+    killed = world.kill(*NODES)
+    world.start(*NODES)
+    world.wait_until(world.end + 0.1)
+    assert stamp(world.states[-1]) > killed
+    assert not world.efforts(killed).any()
+    assert not np.any([state.position for state in world.states if stamp(state) > killed])
+    world.assert_next_goal_works(0.5)
+
+
+def test_a_planner_restarted_in_a_motion_waits_for_its_end(graph):
+    world = World(graph, *NODES)
+    world.move(2.0, 8.0)
+    world.wait_until(world.begin + 2.0)
+    world.kill('planner_node')
+    world.start('planner_node')
+    verdict = world.ask(0.0)
+    while verdict['error_name'].startswith('START_STATE'):
+        verdict = world.ask(0.0)
+    if abs(world.states[-1].velocity[0]) > 0.15:  # it moves even now
+        assert verdict['error_name'] == 'NOT_AT_REST'
+        world.wait_until(world.end + 0.1)
+        if not world.is_said_to_be_late():
+            assert world.states[-1].position[0] == pytest.approx(2.0, abs=1e-3)
+    world.assert_next_goal_works(0.5)

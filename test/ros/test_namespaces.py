@@ -1,0 +1,71 @@
+"""Three arms in namespaces of one graph; and processes that are not to be found beyond a host."""
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.ros import interfaces
+import numpy as np
+import pytest
+from ros.world import EVERY_VERDICT, goal, stamp, values
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+
+ARMS = ('left', 'middle', 'right')
+
+
+def test_three_arms_on_one_graph_do_not_hear_each_other(graph):
+    states, status, commands, reports = {}, {}, {}, {}
+    for arm in ARMS:
+        graph.start('demo', '--ros-args', '-r', f'__ns:=/{arm}')
+        states[arm] = graph.collect(JointState, f'/{arm}/joint_states', 1000, matched=False)
+        status[arm] = graph.collect(
+            DiagnosticArray, f'/{arm}/flat_planner/status', EVERY_VERDICT, matched=False
+        )
+        commands[arm] = graph.collect(
+            JointTrajectory, f'/{arm}/flat_planner/joint_trajectory', 100, matched=False
+        )
+        reports[arm] = graph.collect(
+            DiagnosticArray, f'/{arm}/flat_monitor/report', interfaces.LATCHED, matched=False
+        )
+    graph.expect(lambda: all(states.values()), 'joint states of all arms', timeout=30.0)
+
+    def accepted(arm):
+        return [v for v in map(values, status[arm]) if v['state'] == 'ACCEPTED']
+
+    for count, (arm, position) in enumerate(zip(ARMS, (1.0, -0.5, 0.7), strict=True), 1):
+        for _ in range(20):
+            graph.publish(f'/{arm}/flat_planner/goal', goal(position, 0.8))
+            if graph.spin_until(lambda arm=arm: accepted(arm), 1.0):
+                break
+        end = float(accepted(arm)[0]['start_time']) + 0.8
+        graph.expect(lambda arm=arm, end=end: stamp(states[arm][-1]) > end + 0.1, 'the end')
+        assert len(accepted(arm)) == len(commands[arm]) == 1
+        for other in ARMS[count:]:
+            assert not status[other]
+            assert not commands[other]
+            moved = [(*state.position, *state.effort) for state in states[other]]
+            assert not np.any(moved)
+        if not graph.logged('ms after its start'):
+            assert states[arm][-1].position[0] == pytest.approx(position, abs=1e-3)
+    graph.expect(lambda: all(reports.values()), 'a report of each arm', timeout=20.0)
+    assert [len(reports[arm]) for arm in ARMS] == [1, 1, 1]
+    assert not graph.logged('is published by')
+
+
+def test_all_topics_and_services_follow_the_namespace(graph):
+    graph.start('demo', '--ros-args', '-r', '__ns:=/cell', '-p', 'flat_plant:publish_clock:=true')
+    graph.expect(lambda: graph.logged('ready'), 'a node', timeout=30.0)
+    graph.expect(lambda: len(graph.logged('ready')) == 3, 'three nodes')
+    allowed = {'/clock', '/diagnostics', '/rosout', '/parameter_events'}
+    topics = {name for name, _ in graph.probe.get_topic_names_and_types()}
+    assert {name for name in topics if not name.startswith('/cell/')} <= allowed
+    services = [name for name, _ in graph.probe.get_service_names_and_types()]
+    services = [name for name in services if not name.startswith('/probe/')]
+    assert services
+    assert all(name.startswith('/cell/') for name in services), services
+
+
+@pytest.mark.parametrize(('reach', 'is_found'), [('LOCALHOST', True), ('OFF', False)])
+def test_the_reach_of_discovery_is_what_is_asked_for(graph, reach, is_found):
+    process = graph.start('plant_node', ROS_AUTOMATIC_DISCOVERY_RANGE=reach)
+    graph.expect(lambda: 'ready' in process.stderr, 'a plant that is ready', timeout=30.0)
+    found = graph.spin_until(lambda: graph.probe.count_publishers('/joint_states'), 3.0)
+    assert found == is_found

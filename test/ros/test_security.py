@@ -1,0 +1,96 @@
+"""The security policy allows what the nodes use and nothing else; nothing received is executed."""
+
+import ast
+from pathlib import Path
+from xml.etree import ElementTree
+
+from flat_planner_ros.ros.monitor_node import MonitorNode
+from flat_planner_ros.ros.planner_node import PlannerNode
+from flat_planner_ros.ros.plant_node import PlantNode
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+POLICY = ElementTree.parse(CHECKOUT / 'config' / 'sros2' / 'policy.xml').getroot()
+NODES = {'flat_planner': PlannerNode, 'flat_plant': PlantNode, 'flat_monitor': MonitorNode}
+
+
+def allowed(enclave, kind, right):
+    """Return the names that an enclave has a right to."""
+    profile = POLICY.find(f"enclaves/enclave[@path='/{enclave}']/profiles/profile")
+    return {e.text for block in profile.findall(kind) if block.get(right) for e in block}
+
+
+def test_the_policy_follows_the_schema():
+    assert POLICY.tag == 'policy'
+    assert POLICY.attrib == {'version': '0.2.0'}
+    rights = {'topics': {'publish', 'subscribe'}, 'services': {'reply', 'request'}}
+    for enclave in POLICY.find('enclaves'):
+        assert enclave.get('path').startswith('/')
+        (profiles,) = enclave
+        for profile in profiles:
+            assert set(profile.attrib) == {'ns', 'node'}
+            for block in profile:
+                assert set(block.attrib) <= rights[block.tag]
+                assert set(block.attrib.values()) == {'ALLOW'}
+                assert {e.tag for e in block} == {block.tag[:-1]}
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_a_node_may_do_what_it_does_and_no_more(graph, name):
+    used = {'publish': set(), 'subscribe': set(), 'reply': set()}
+    variants = {'flat_plant': [{'publish_clock': True}, {'input': 'effort'}]}
+    for parameters in ({}, {'use_sim_time': True}, *variants.get(name, [])):
+        node = graph.create(NODES[name], parameters)
+        for right, names in {
+            'publish': node.get_publisher_names_and_types_by_node(name, '/'),
+            'subscribe': node.get_subscriber_names_and_types_by_node(name, '/'),
+            'reply': node.get_service_names_and_types_by_node(name, '/'),
+        }.items():
+            used[right] |= {topic for topic, _ in names}
+        graph.remove(node)
+    assert used['publish'] == allowed(name, 'topics', 'publish')
+    assert used['subscribe'] == allowed(name, 'topics', 'subscribe')
+    assert used['reply'] == allowed(name, 'services', 'reply')
+
+
+def test_only_the_planner_commands_and_only_the_operator_sends_goals():
+    enclaves = [e.get('path')[1:] for e in POLICY.find('enclaves')]
+    senders = {
+        topic: {e for e in enclaves if topic in allowed(e, 'topics', 'publish')}
+        for topic in ('/flat_planner/joint_trajectory', '/flat_planner/goal')
+    }
+    assert senders == {
+        '/flat_planner/joint_trajectory': {'flat_planner'},
+        '/flat_planner/goal': {'operator'},
+    }
+    assert not any('set_parameters' in s for s in allowed('operator', 'services', 'request'))
+
+
+FORBIDDEN = {'eval', 'exec', 'compile', '__import__', 'os.system', 'os.popen'}
+FORBIDDEN |= {'yaml.unsafe_load', 'yaml.full_load', 'yaml.unsafe_load_all', 'yaml.full_load_all'}
+SAFE_LOADERS = {'yaml.SafeLoader', 'yaml.CSafeLoader'}
+
+
+@pytest.mark.parametrize(
+    'path', sorted((CHECKOUT / 'flat_planner_ros').rglob('*.py')), ids=lambda path: path.stem
+)
+def test_nothing_received_is_executed(path):
+    tree = ast.parse(path.read_text('utf-8'))
+    safe = SAFE_LOADERS | {
+        found.name
+        for found in ast.walk(tree)
+        if isinstance(found, ast.ClassDef)
+        and {ast.unparse(base) for base in found.bases} & SAFE_LOADERS
+    }
+    for found in ast.walk(tree):
+        if isinstance(found, ast.Import | ast.ImportFrom):
+            modules = {alias.name for alias in found.names} | {getattr(found, 'module', None)}
+            assert not modules & {'pickle', 'marshal', 'shelve', 'dill', 'joblib', 'cloudpickle'}
+        if isinstance(found, ast.Call):
+            name = ast.unparse(found.func)
+            assert name not in FORBIDDEN
+            if name in ('yaml.load', 'yaml.load_all'):
+                assert ast.unparse(found.args[1]) in safe
+            for keyword in found.keywords:
+                is_true = getattr(keyword.value, 'value', None) is True
+                assert not (keyword.arg in ('shell', 'allow_pickle') and is_true)

@@ -1,0 +1,127 @@
+"""The three nodes in processes of their own, from the outside."""
+
+from time import monotonic
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.ros import conversions, interfaces
+import numpy as np
+import pytest
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+NODES = ('planner_node', 'plant_node', 'monitor_node')
+COMMAND, STATUS = '/flat_planner/joint_trajectory', '/flat_planner/status'
+EVERY_VERDICT = QoSProfile(depth=1000, durability=interfaces.LATCHED.durability)
+ANSWERS = ('ACCEPTED', 'REJECTED')
+
+
+def goal(position, duration=1.0):
+    """Return a goal for joint 1."""
+    point = JointTrajectoryPoint(positions=[float(position)])
+    point.time_from_start = conversions.duration_msg(duration)
+    return JointTrajectory(joint_names=['joint1'], points=[point])
+
+
+def values(msg):
+    """Return the values of a message's only status."""
+    return {pair.key: pair.value for pair in msg.status[0].values}
+
+
+def stamp(msg):
+    """Return when a message is stamped [s]."""
+    return conversions.seconds(msg.header.stamp)
+
+
+class World:
+    """The three nodes in processes, and what they say."""
+
+    def __init__(self, graph, *programs, arguments=(), **environment):
+        """Start them, in one process or in several."""
+        self.graph, self.arguments, self.environment = graph, arguments, environment
+        self.states = graph.collect(JointState, '/joint_states', 1000, matched=False)
+        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT, matched=False)
+        self.commands = graph.collect(JointTrajectory, COMMAND, 100, matched=False)
+        self.reports = graph.collect(
+            DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED, matched=False
+        )
+        self.processes = {}
+        self.start(*programs or ['demo'])
+
+    def start(self, *programs):
+        """Start programs and wait until their nodes are ready."""
+        ready = len(self.graph.logged('ready'))
+        for name in programs:
+            self.processes[name] = self.graph.start(name, *self.arguments, **self.environment)
+        count = sum(3 if name == 'demo' else 1 for name in programs)
+        self.graph.expect(
+            lambda: len(self.graph.logged('ready')) >= ready + count, 'ready nodes', timeout=30.0
+        )
+
+    def kill(self, *programs):
+        """End programs by SIGKILL; return when [s]."""
+        for name in programs:
+            self.processes.pop(name).kill()
+        return conversions.seconds(self.graph.probe.get_clock().now().to_msg())
+
+    def answers(self):
+        """Return the values of all verdicts."""
+        return [v for v in map(values, self.status) if v.get('state') in ANSWERS]
+
+    def ask(self, position, duration=1.0):
+        """Send a goal; return its verdict."""
+        count = len(self.answers())
+        self.graph.publish('/flat_planner/goal', goal(position, duration))
+        self.graph.expect(lambda: len(self.answers()) > count, 'a verdict')
+        return self.answers()[count]
+
+    def move(self, position, duration=1.0):
+        """Send a goal until it is accepted: at first the planner may not have heard of the arm."""
+        until = monotonic() + 60.0
+        while monotonic() < until:
+            verdict = self.ask(position, duration)
+            if verdict['state'] == 'ACCEPTED':
+                self.begin = float(verdict['start_time'])
+                self.end = self.begin + float(verdict['duration'])
+                return verdict
+            assert verdict['error_name'] in (
+                'START_STATE_UNKNOWN',
+                'START_STATE_STALE',
+                'NOT_AT_REST',
+            )
+            self.wait_until(stamp(self.states[-1]) + 0.1 if self.states else 0.0)
+        pytest.fail(f'no goal is accepted: {verdict}')
+
+    def wait_until(self, time):
+        """Wait for a joint state stamped then or later."""
+        self.graph.expect(
+            lambda: self.states and stamp(self.states[-1]) >= time, f'{time} s', timeout=40.0
+        )
+
+    def amplitude(self):
+        """Return what the monitor says of the present motion [rad]."""
+
+        def mine():
+            found = map(values, self.reports)
+            return [v for v in found if abs(float(v['start_time']) - self.begin) < 1e-3]
+
+        self.graph.expect(mine, 'a report of this motion', timeout=40.0)
+        return float(mine()[-1]['amplitude'])
+
+    def efforts(self, since=0.0):
+        """Return the efforts of joint 1 from a time [s] on [N m]."""
+        return np.array([s.effort[0] for s in self.states if stamp(s) >= since])
+
+    def is_said_to_be_late(self):
+        """Return whether the plant has said that it could not play the motion in time."""
+        words = ('ms after its start', 'skipped to keep up', 'trajectory ignored')
+        return any(self.graph.logged(word) for word in words)
+
+    def assert_next_goal_works(self, position):
+        """Move and look at where the arm comes to rest."""
+        self.move(position)
+        self.wait_until(self.end + 0.1)
+        if not self.is_said_to_be_late():
+            assert self.states[-1].position[0] == pytest.approx(position, abs=1e-3)
+        assert self.efforts(self.end + 0.02).size
+        assert not self.efforts(self.end + 0.02).any()

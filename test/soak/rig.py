@@ -1,0 +1,335 @@
+"""One arm of the soak test: three nodes in processes, relays with faults, random episodes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from time import monotonic, time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.ros import conversions, interfaces
+import numpy as np
+from rclpy.qos import QoSProfile
+from ros.conftest import Graph
+from ros.relay import Faults, Relay
+from ros.world import ANSWERS, EVERY_VERDICT, NODES, stamp, values
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+CONFIG = Path(__file__).resolve().parents[2] / 'config'
+
+NEWEST = QoSProfile(depth=1)
+"""Joint states: what the driver is too slow for need not be seen."""
+
+EXACT = 1e-5
+"""Largest amplitude on an arm like the model [rad]."""
+
+NOISE = 1e-4
+"""Standard deviation of noisy joint angles, and largest amplitude that they feign [rad]."""
+
+UNEVEN = Faults(loss=0.1, duplication=0.3, delay=(0.0, 0.2))
+"""What goes wrong between the nodes in an episode of bad transport."""
+
+LATE = ('ms after its start', 'skipped to keep up', 'trajectory ignored', 'set back')
+"""What the plant says of commands that it could not play as they were planned."""
+
+DEADLINE = 60.0
+"""Time within which anything must happen [s]."""
+
+MEMORY_PERIOD = 2.0
+"""Time between two looks at the memory of the nodes [s]."""
+
+
+class Rig:
+    """
+    Three nodes of one arm and what is done to them.
+
+    Parameters
+    ----------
+    graph
+        A graph of its own.
+    file
+        Parameter file of the arm.
+    speed
+        Simulated seconds per second, the plant owning the time; None for real time.
+    seed
+        Of all that is random.
+
+    Attributes
+    ----------
+    counts
+        How often anything happened.
+    failures
+        What must not happen, a sentence each.
+    memory
+        Resident memory of each process, (node, process id) to lists of (seconds, bytes).
+
+    """
+
+    def __init__(self, graph: Graph, file: str, speed: float | None, seed: int) -> None:
+        """Start the nodes."""
+        self.graph, self.speed = graph, speed
+        self.random = np.random.default_rng(seed)
+        self.counts: Counter[str] = Counter()
+        self.failures: list[str] = []
+        self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
+        self.offsets: list[tuple[float, float]] = []
+        self._born, self._looked = monotonic(), 0.0
+        simulated = '' if speed is None else 'true'
+        self._parameters = {
+            'flat_planner:start_delay': 0.3,
+            'flat_planner:replan.lookahead': 0.6,
+            'flat_planner:reference_rate': 10.0,
+            'flat_monitor:window': 1.5,
+            'flat_plant:publish_rate': 100.0,
+        }
+        if simulated:
+            self._parameters |= {
+                'flat_planner:use_sim_time': True,
+                'flat_monitor:use_sim_time': True,
+                'flat_plant:publish_clock': True,
+                'flat_plant:real_time_factor': speed,
+            }
+        self._file = str(CONFIG / file)
+        own = {'context': graph.context, 'use_global_arguments': False}
+        self.goals, self.commands = (
+            graph.add(Relay(JointTrajectory, source, target, seed=seed + 1, **own))
+            for source, target in (
+                ('/goals', '/flat_planner/goal'),
+                ('/flat_planner/joint_trajectory', '/late/joint_trajectory'),
+            )
+        )
+        self.state: JointState | None = None
+        graph.probe.create_subscription(JointState, '/joint_states', self._on_state, NEWEST)
+        self.status = graph.collect(
+            DiagnosticArray, '/flat_planner/status', EVERY_VERDICT, matched=False
+        )
+        self.reports = graph.collect(
+            DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED, matched=False
+        )
+        self.processes = {}
+        for name in NODES:
+            self.start(name)
+        self._expect(lambda: self.state, 'joint states')
+        self.joints = len(self.state.name) - 1
+
+    def start(self, name: str) -> None:
+        """Start a node and wait until it is ready and found."""
+        ready = len(self.graph.logged('ready'))
+        words = ['--ros-args', '--params-file', self._file]
+        for key, value in self._parameters.items():
+            words += ['-p', f'{key}:={str(value).lower() if value is True else value}']
+        words += ['-r', 'flat_plant:flat_planner/joint_trajectory:=/late/joint_trajectory']
+        process = self.graph.start(name, *words)
+        self.processes[name] = process
+        self.memory[name, process.pid] = []
+        self._expect(lambda: len(self.graph.logged('ready')) > ready, f'{name}')
+
+    def kill(self, name: str) -> None:
+        """End a node by SIGKILL."""
+        self.processes.pop(name).kill()
+        self.counts['kills'] += 1
+
+    def run(self, seconds: float) -> None:
+        """Let episodes follow each other for a time [s]."""
+        until = monotonic() + seconds
+        kinds = ['plain', 'mismatch', 'noise', 'replan', 'stop', 'transport', 'invalid']
+        if self.speed is None:
+            kinds += ['kill planner_node', 'kill plant_node', 'kill monitor_node']
+        while monotonic() < until:
+            kind = str(self.random.choice(kinds))
+            try:
+                self._episode(kind)
+            except AssertionError as error:
+                self.failures.append(f'{kind}: {error}')
+                if len(self.failures) > 10:
+                    return
+        self.counts['seconds'] = round(monotonic() - self._born)
+
+    def _episode(self, kind: str) -> None:
+        """Move once, with whatever happens."""
+        self.counts['episodes'] += 1
+        del self.status[:], self.reports[:], self.graph.log[:]
+        for relay in (self.goals, self.commands):
+            relay.faults = Faults()
+            del relay.received[:], relay.delivered[:]
+        self._prepare(kind)
+        self.graph.call(Trigger, '/flat_plant/reset')
+        self._wait(0.5)
+        if kind == 'transport':
+            self.goals.faults = self.commands.faults = UNEVEN
+        if kind == 'invalid':
+            self._send([float('nan')] * self.joints)
+        verdict = self._move()
+        if kind == 'replan':
+            for _ in range(int(self.random.integers(1, 4))):
+                self._wait(float(self.random.uniform(0.05, 0.4)))
+                self._send(self._pose())
+                self.counts['re-plans'] += 1
+            self._expect(lambda: self._answered() >= len(self.goals.delivered), 'verdicts')
+        elif kind == 'stop':
+            self._wait_until(float(verdict['start_time']) + float(self.random.uniform(0.0, 0.5)))
+            self.graph.call(Trigger, '/flat_planner/stop')
+            self.counts['stops'] += 1
+        elif kind.startswith('kill'):
+            self._wait_until(float(verdict['start_time']) + float(self.random.uniform(0.0, 0.8)))
+            self._kill_and_restart(kind.split()[1])
+            return
+        self._finish(kind)
+
+    def _prepare(self, kind: str) -> None:
+        """Make the arm and its sensors what the episode wants."""
+        scales = self.random.uniform(0.9, 1.1, 2) if kind == 'mismatch' else (1.0, 1.0)
+        values_ = {
+            'mismatch.stiffness_scale': float(scales[0]),
+            'mismatch.damping_scale': float(scales[1]),
+            'noise.position_std': NOISE if kind == 'noise' else 0.0,
+        }
+        results = self.graph.set_parameters('flat_plant', **values_)
+        assert all(result.successful for result in results), results
+
+    def _finish(self, kind: str) -> None:
+        """Wait for the last motion's report and look at everything."""
+        self._expect(lambda: self.goals.is_idle and self.commands.is_idle, 'idle relays')
+        delivered = len(self.goals.delivered)
+        self._expect(lambda: self._answered() >= delivered, 'all verdicts')
+        accepted = [v for v in self._verdicts() if v['state'] == 'ACCEPTED']
+        self.counts['goals'] += len(self.goals.received)
+        self.counts['goals lost or doubled'] += abs(delivered - len(self.goals.received))
+        self.counts['goals arrived'] += delivered
+        if accepted:
+            self._expect(lambda: self._ended(accepted[-1]), 'the end of the last motion')
+            last = self._ended(accepted[-1])[0]
+            end = float(last['start_time']) + float(last['duration'])
+            self._wait_until(end + 1.7)
+            self._expect(lambda: self._report_of(end), f'a report of the motion until {end}')
+            self._judge(kind, accepted[-1], self._report_of(end)[-1])
+        self._wait(0.1)
+        answered = self._answered()
+        self.counts['verdicts'] += answered
+        self.counts['accepted'] += len(accepted)
+        assert answered == delivered, f'{answered} verdicts on {delivered} goals'
+
+    def _judge(self, kind: str, verdict: dict[str, str], report: dict[str, str]) -> None:
+        """Compare what was left with what had to be."""
+        self.counts['motions reported'] += 1
+        if any(self.graph.logged(word) for word in LATE):
+            self.counts['motions late or refused, said by the plant'] += 1
+            return
+        if kind == 'transport' and len(self.commands.delivered) < len(self.commands.received):
+            self.counts['motions not played, command lost'] += 1
+            return
+        bound = {
+            'mismatch': 1.2 * float(verdict['predicted_residual_worst']) + EXACT,
+            'noise': NOISE,
+        }.get(kind, EXACT)
+        amplitude = float(report['amplitude'])
+        self.counts['residuals checked'] += 1
+        assert amplitude <= bound, f'amplitude {amplitude:.2e} rad above {bound:.2e} rad'
+        # Feedback balances what weight the model has wrong; without it nothing is applied.
+        if self.joints == 1:
+            assert not self.state.effort[0], f'effort {self.state.effort[0]} N m at rest'
+
+    def _kill_and_restart(self, name: str) -> None:
+        """End a node in the midst of a motion; nothing moves by itself, the next goal works."""
+        self.kill(name)
+        killed = time()
+        self.start(name)
+        if name == 'plant_node':
+            self._expect(lambda: self.state and stamp(self.state) > killed, 'a new plant')
+            still = list(self.state.position)
+            self._wait(1.0)
+            moved = np.abs(np.subtract(self.state.position, still)).max()
+            assert moved < 1e-9, f'the restarted plant has moved by {moved} rad'
+        self._wait(2.5)
+        del self.status[:], self.reports[:], self.graph.log[:]
+        for relay in (self.goals, self.commands):
+            del relay.received[:], relay.delivered[:]
+        self.graph.call(Trigger, '/flat_plant/reset')
+        self._wait(0.5)
+        self._move()
+        self._finish('plain')
+
+    def _pose(self) -> list[float]:
+        """Return a random pose of the actuated joints [rad]."""
+        return [float(angle) for angle in self.random.uniform(-1.2, 1.2, self.joints)]
+
+    def _send(self, pose: list[float]) -> None:
+        """Send a goal through the relay."""
+        point = JointTrajectoryPoint(positions=pose)
+        point.time_from_start = conversions.duration_msg(float(self.random.uniform(1.2, 2.0)))
+        names = [f'joint{index + 1}' for index in range(self.joints)]
+        received = len(self.goals.received)
+        self.graph.publish('/goals', JointTrajectory(joint_names=names, points=[point]))
+        self._expect(lambda: len(self.goals.received) > received, 'the goal at the relay')
+
+    def _move(self) -> dict[str, str]:
+        """Send goals until one is accepted; return its verdict."""
+        for _ in range(30):
+            delivered = len(self.goals.delivered)
+            self._send(self._pose())
+            self._expect(lambda: self.goals.is_idle, 'an idle relay')
+            if len(self.goals.delivered) > delivered:
+                self._expect(lambda: self._answered() >= len(self.goals.delivered), 'a verdict')
+                accepted = [v for v in self._verdicts() if v['state'] == 'ACCEPTED']
+                if accepted:
+                    return accepted[-1]
+                self._wait(0.3)
+        raise AssertionError('no goal is accepted: ' + self._verdicts()[-1]['error_name'])
+
+    def _all(self) -> list[dict[str, str]]:
+        """Return the values of all statuses."""
+        return [values(message) for message in self.status]
+
+    def _verdicts(self) -> list[dict[str, str]]:
+        """Return the values of the verdicts on goals."""
+        return [v for v in self._all() if v.get('state') in ANSWERS]
+
+    def _answered(self) -> int:
+        """Return the number of verdicts on goals."""
+        return len(self._verdicts())
+
+    def _ended(self, verdict: dict[str, str]) -> list[dict[str, str]]:
+        """Return how an accepted goal has ended."""
+        plan_id = verdict['plan_id']
+        states = ('FINISHED', 'STOPPED')
+        return [v for v in self._all() if v['state'] in states and v['plan_id'] == plan_id]
+
+    def _report_of(self, end: float) -> list[dict[str, str]]:
+        """Return the reports on the motion with an end [s]."""
+        found = map(values, self.reports)
+        return [v for v in found if abs(float(v.get('end_time', 0.0)) - end) < 5e-3]
+
+    def _on_state(self, state: JointState) -> None:
+        """Keep the newest joint state and how far it is behind the time of day."""
+        self.state = state
+        if self.speed is None:
+            self.offsets.append((monotonic() - self._born, time() - stamp(state)))
+
+    def _wait(self, seconds: float) -> None:
+        """Wait for a time of the plant."""
+        self._wait_until(stamp(self.state) + seconds)
+
+    def _wait_until(self, moment: float) -> None:
+        """Wait for a joint state stamped then or later."""
+        self._expect(lambda: stamp(self.state) >= moment, f'the time {moment:.3f} s')
+
+    def _expect(self, condition, what: str) -> None:
+        """Wait for a condition, and look at the memory meanwhile."""
+
+        def holds() -> object:
+            now = monotonic()
+            if now - self._looked > MEMORY_PERIOD:
+                self._looked = now
+                self._look()
+            return condition()
+
+        self.graph.expect(holds, what, DEADLINE)
+
+    def _look(self) -> None:
+        """Note the memory of the nodes, and that they live."""
+        for name, process in self.processes.items():
+            assert process.exit_code is None, f'{name} has ended: {process.stderr[-2000:]}'
+            pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[1])
+            self.memory[name, process.pid].append((monotonic() - self._born, pages * 4096))
