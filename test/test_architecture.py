@@ -72,7 +72,7 @@ MAY_IMPORT = {
     'timing': 'duration limits extrema certified_plan rejection',
     'session_settings': 'timing limits request rejection arm errors',
     'rest_start': 'session_settings motion_record rejection',
-    'takeover': 'timeline solutions rejection',
+    'takeover': 'session_settings timeline motion_record solutions rejection',
     'answer': 'takeover session_settings timing via_times planning request goal rejection errors',
     'session': 'answer rest_start takeover session_settings stopping timeline plan_samples goal '
     'rejection motion_record',

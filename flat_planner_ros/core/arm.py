@@ -123,7 +123,7 @@ class PlanarArm:
         if n < 2 or inertia.shape != (n, n):
             raise InvalidModel(f'inertia must be (n, n) with n >= 2, got shape {inertia.shape}')
         check_definite(inertia)
-        inertia = (inertia + inertia.T) / 2
+        inertia = inertia + (inertia.T - inertia) / 2  # the sum of both may overflow
         inertia.setflags(write=False)
         fields = {
             'inertia': inertia,

@@ -25,6 +25,9 @@ WEIGHT_EXPONENT = 8
 MAX_FACTOR = 1e100
 """Largest factor of a derivative in a cost; its square and sums of squares still have room."""
 
+MAX_ENTRY = MAX_FACTOR**2
+"""Largest entry of a cost's Q; sums of several still have room."""
+
 MAX_WEIGHT = 1000.0
 """Largest r or p accepted: beyond, weight**8 times the arm's data may leave double precision."""
 
@@ -77,6 +80,9 @@ class QuadraticCost:
         if infinite.size:
             i, j = infinite[0]
             raise InvalidCost(f'Q{i + 1}{j + 1} = {matrix[i, j]:g} must be finite')
+        if np.abs(matrix).max() > MAX_ENTRY:
+            i, j = np.unravel_index(np.argmax(np.abs(matrix)), matrix.shape)
+            raise InvalidCost(f'Q{i + 1}{j + 1} = {matrix[i, j]:g} is beyond {MAX_ENTRY:g}')
         if matrix[-1, -1] != 1.0:
             raise InvalidCost(f'Q66 must be 1, got {matrix[-1, -1]:g}')
         _check_semidefinite(matrix)
@@ -144,7 +150,8 @@ def strategy_cost(
     matrix = np.zeros((ORDER, ORDER))
     if strategy in (Strategy.MIN_CONTROL_EFFORT, Strategy.MIXED):
         effort = flat_map.effort[1:]
-        weighted = r ** (WEIGHT_EXPONENT // 2) * effort
+        with np.errstate(over='ignore', invalid='ignore'):
+            weighted = r ** (WEIGHT_EXPONENT // 2) * effort
         largest = float(np.abs(weighted).max())
         if not largest < MAX_FACTOR:
             raise InvalidCost(
@@ -180,7 +187,14 @@ def _check_semidefinite(matrix: FloatArray) -> None:
         order = int(np.flatnonzero(empty & (matrix.any(0) | matrix.any(1)))[0]) + 1
         raise InvalidCost(f'Q is indefinite: Q{order}{order} = 0 but row {order} is not zero')
     root = np.sqrt(np.where(empty, 1.0, diagonal))
-    scaled = matrix / root / root[:, None]
+    with np.errstate(over='ignore'):
+        scaled = matrix / root / root[:, None]
+    if np.isinf(scaled).any():
+        i, j = np.argwhere(np.isinf(scaled))[0]
+        raise InvalidCost(
+            f'Q is indefinite: Q{i + 1}{j + 1} = {matrix[i, j]:g} exceeds the root of '
+            f'Q{i + 1}{i + 1} Q{j + 1}{j + 1}'
+        )
     asymmetry = np.abs(scaled - scaled.T).max()
     if asymmetry > SYMMETRY_TOLERANCE:
         i, j = np.unravel_index(np.argmax(np.abs(scaled - scaled.T)), matrix.shape)

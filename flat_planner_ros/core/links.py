@@ -85,7 +85,12 @@ def check_definite(inertia: Array) -> None:
     own = np.diag(inertia)
     if own.min() <= 0.0:
         raise InvalidModel(f'inertia of every link must be above 0 kg m^2, got {own.min():g}')
-    scaled = inertia / np.sqrt(np.outer(own, own))
+    # Root by root: the product of two entries may leave double precision.
+    root = np.sqrt(own)
+    with np.errstate(over='ignore'):
+        scaled = inertia / root / root[:, None]
+    if np.isinf(scaled).any():
+        raise InvalidModel(f'inertia must be positive definite, got {inertia.tolist()} kg m^2')
     if (np.abs(scaled - scaled.T) > SYMMETRY_TOLERANCE).any():
         raise InvalidModel(f'inertia must be symmetric, got {inertia.tolist()} kg m^2')
     least = float(np.linalg.eigvalsh(scaled)[0])

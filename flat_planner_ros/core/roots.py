@@ -10,7 +10,7 @@ do not (docs/derivation.md, section 5).
 from cmath import sqrt
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+BoolArray = NDArray[np.bool_]
 Number = TypeVar('Number', np.float64, np.complex128)
 
 LINK = 2.5
@@ -61,6 +62,11 @@ class Cluster:
     centre: complex
     factor: ComplexArray
 
+    def scaled(self, scale: float) -> 'Cluster':
+        """Return the cluster with all roots multiplied by a factor."""
+        powers = scale ** np.arange(len(self.factor))
+        return Cluster(centre=scale * self.centre, factor=self.factor * powers)
+
 
 def clusters(coefficients: FloatArray) -> list[Cluster]:
     """
@@ -72,26 +78,85 @@ def clusters(coefficients: FloatArray) -> list[Cluster]:
         a_0 ... a_6 in normalised time, a_0 = 0 and a_6 = 1, shape (7,) [-].
 
     """
-    zeros = next(k for k, a in enumerate(coefficients.tolist()) if a != 0.0)
-    reduced = coefficients[zeros:]
-    squares = _companion_roots(reduced)
-    separate = _separate(reduced.tolist(), squares.tolist(), zeros)
-    if separate is not None:
-        return separate
-    groups = _groups(np.concatenate([np.zeros(zeros, dtype=complex), squares]))
-    places = squares.tolist()
-    members = [[places[i - zeros] for i in group.members if i >= zeros] for group in groups]
-    central, *others = _factors(reduced[::-1].tolist(), members)
-    around_zero = np.zeros(2 * (len(central) + zeros) - 1, dtype=complex)
-    around_zero[: 2 * len(central) : 2] = central
-    found = [
-        _cluster(_roots(factor), group.is_imaginary)
-        for factor, group in zip(others, groups[1:], strict=True)
-    ]
-    return [
-        Cluster(centre=0j, factor=around_zero),
-        *(cluster for cluster in found if cluster is not None),
-    ]
+    return Spectrum(coefficients).clusters(1.0)
+
+
+class Spectrum:
+    """
+    Characteristic roots of an equation in one unit of time, clustered in any other.
+
+    In another unit all roots are multiples of themselves; only which of them are close together
+    depends on it. They are found once, and the clusters once for each grouping.
+
+    Parameters
+    ----------
+    coefficients
+        a_0 ... a_6, a_0 = 0 and a_6 = 1, shape (7,).
+
+    """
+
+    def __init__(self, coefficients: FloatArray) -> None:
+        """Find the roots."""
+        self._zeros = next(k for k, a in enumerate(coefficients.tolist()) if a != 0.0)
+        self._reduced = coefficients[self._zeros :]
+        self._squares = _companion_roots(self._reduced)
+        self._alone = _polished_roots(self._reduced.tolist(), self._squares.tolist())
+        self._grouped: dict[bytes, list[Cluster]] = {}
+
+    def clusters(self, scale: float) -> list[Cluster]:
+        """Return the clusters of all roots multiplied by a positive factor."""
+        if self._alone is not None:
+            roots = self._alone if scale == 1.0 else [scale * beta for beta in self._alone]
+            if _are_apart(roots):
+                central = Cluster(centre=0j, factor=_monomial(2 * self._zeros))
+                others = (Cluster(centre=beta, factor=_monomial(1)) for beta in roots)
+                return [central, *others]
+        linked = self._links(scale)
+        key = linked.tobytes()
+        if key not in self._grouped:
+            self._grouped[key] = self._of_groups(linked)
+        found = self._grouped[key]
+        return found if scale == 1.0 else [cluster.scaled(scale) for cluster in found]
+
+    @cached_property
+    def _beta(self) -> ComplexArray:
+        """All roots but their mirror images."""
+        beta: ComplexArray = np.sqrt(
+            np.concatenate([np.zeros(self._zeros, dtype=complex), self._squares])
+        )
+        return beta
+
+    @cached_property
+    def _distances(self) -> tuple[FloatArray, FloatArray]:
+        """Distances of all twelve +-beta, and those that their decay rates bridge."""
+        both = np.concatenate([self._beta, -self._beta])
+        decay = np.abs(both.real)
+        same_side = np.outer(both.real, both.real) > 0.0
+        relative = RELATIVE_LINK * np.minimum.outer(decay, decay) * same_side
+        return np.abs(both[:, None] - both[None, :]), relative
+
+    def _links(self, scale: float) -> BoolArray:
+        """Return which of the twelve +-beta are close together, shape (12, 12)."""
+        distances, relative = self._distances
+        linked: BoolArray = distances <= np.maximum(LINK / scale, relative)
+        return linked
+
+    def _of_groups(self, linked: BoolArray) -> list[Cluster]:
+        """Return the clusters of linked roots, in the spectrum's own unit."""
+        groups = _groups(self._beta, linked)
+        places, zeros = self._squares.tolist(), self._zeros
+        members = [[places[i - zeros] for i in group.members if i >= zeros] for group in groups]
+        central, *others = _factors(self._reduced[::-1].tolist(), members)
+        around_zero = np.zeros(2 * (len(central) + zeros) - 1, dtype=complex)
+        around_zero[: 2 * len(central) : 2] = central
+        found = [
+            _cluster(_roots(factor), group.is_imaginary)
+            for factor, group in zip(others, groups[1:], strict=True)
+        ]
+        return [
+            Cluster(centre=0j, factor=around_zero),
+            *(cluster for cluster in found if cluster is not None),
+        ]
 
 
 def _companion_roots(ascending: NDArray[Number]) -> ComplexArray:
@@ -108,8 +173,8 @@ def _companion_roots(ascending: NDArray[Number]) -> ComplexArray:
     return roots
 
 
-def _separate(ascending: list[float], squares: list[complex], zeros: int) -> list[Cluster] | None:
-    """Return one cluster for each root and one for those at zero, None unless all are apart."""
+def _polished_roots(ascending: list[float], squares: list[complex]) -> list[complex] | None:
+    """Return the roots beta by themselves, None unless Newton's method converges for all."""
     roots: list[complex] = []
     for z in squares:
         if z.imag >= 0.0:
@@ -117,19 +182,23 @@ def _separate(ascending: list[float], squares: list[complex], zeros: int) -> lis
             if polished is None:
                 return None
             roots.append(sqrt(polished))
+    return roots
+
+
+def _are_apart(roots: list[complex]) -> bool:
+    """Tell whether each root is a cluster of its own, far from zero and the imaginary axis."""
     for i, beta in enumerate(roots):
         modulus = abs(beta)
         # Half the distance to its mirror image or its conjugate.
         near = 0.5 * max(PAIR_LINK, PAIR_RELATIVE_LINK * modulus)
         if modulus <= LINK or beta.real <= near or 0.0 != beta.imag <= near:
-            return None
+            return False
         for other in roots[:i]:
             # The images of two roots are at least as far apart as they are in the quadrant.
             reach = max(LINK, RELATIVE_LINK * min(beta.real, other.real))
             if abs(beta - other) <= reach:
-                return None
-    central = Cluster(centre=0j, factor=_monomial(2 * zeros))
-    return [central, *(Cluster(centre=beta, factor=_monomial(1)) for beta in roots)]
+                return False
+    return True
 
 
 def _polished(ascending: list[float], z: complex) -> complex | None:
@@ -170,14 +239,8 @@ class _Group(NamedTuple):
     is_imaginary: bool
 
 
-def _groups(squares: ComplexArray) -> list[_Group]:
+def _groups(beta: ComplexArray, linked: BoolArray) -> list[_Group]:
     """Return linked roots, single linkage over all twelve +-beta, those around zero first."""
-    beta = np.sqrt(squares)
-    both = np.concatenate([beta, -beta])
-    decay = np.abs(both.real)
-    same_side = np.outer(both.real, both.real) > 0.0
-    reach = np.maximum(LINK, RELATIVE_LINK * np.minimum.outer(decay, decay) * same_side)
-    linked = np.abs(both[:, None] - both[None, :]) <= reach
     for _ in range(4):  # Paths of up to 2**4 links: more than twelve roots can form.
         linked = linked @ linked
     count = len(beta)
@@ -300,7 +363,15 @@ def _is_conjugate_closed(squares: Sequence[complex]) -> bool:
 
 
 def _cluster(squares: Sequence[complex], is_imaginary: bool) -> Cluster | None:
-    """Return the representative of a group away from zero, None for the mirror image of one."""
+    """
+    Return the representative of a group away from zero, None for the mirror image of one.
+
+    Raises
+    ------
+    ArithmeticError
+        The group has come to lie at zero: next to others, its roots are lost in double precision.
+
+    """
     if not _is_conjugate_closed(squares):
         if sum(z.imag for z in squares) < 0.0:
             return None
@@ -312,5 +383,7 @@ def _cluster(squares: Sequence[complex], is_imaginary: bool) -> Cluster | None:
     else:
         roots = [sqrt(z) for z in squares]
         centre = complex(sum(root.real for root in roots) / len(roots))
+    if centre == 0.0:
+        raise ArithmeticError('the smallest characteristic roots are lost in double precision')
     factor = np.array(_monic(root - centre for root in roots))
     return Cluster(centre=centre, factor=factor)

@@ -6,11 +6,12 @@ neighbours share them. What the coupling needs are the derivatives of every solu
 up to the eleventh ((V4) of docs/derivation.md).
 """
 
+from cmath import exp
 from dataclasses import dataclass
 from functools import lru_cache
 
-from flat_planner_ros.core.modes import Mode, series_derivatives
-from flat_planner_ros.core.roots import clusters
+from flat_planner_ros.core.modes import leibniz, Mode, series_derivatives
+from flat_planner_ros.core.roots import Spectrum
 from flat_planner_ros.core.solutions import ALTERNATING, Block, block_of, CONDITIONS
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ SOLUTIONS = 2 * CONDITIONS
 
 BASES_KEPT = 256
 """Bases that are remembered: those of several paths of fifty via points."""
+
+SPECTRA_KEPT = 64
+"""Sets of roots that are remembered, one for each combination of arm and cost."""
+
+_ENDS = np.array([-1.0, 1.0])
 
 _MIRRORED = np.tile(ALTERNATING, 2)
 
@@ -64,7 +70,7 @@ class SegmentBasis:
 
 
 @lru_cache(maxsize=BASES_KEPT)
-def segment_basis(key: bytes) -> SegmentBasis:
+def segment_basis(key: bytes, reference: bytes) -> SegmentBasis:
     """
     Return the solutions of an equation.
 
@@ -72,9 +78,13 @@ def segment_basis(key: bytes) -> SegmentBasis:
     ----------
     key
         The bytes of the coefficients a_0 ... a_6 in normalised time.
+    reference
+        The same in another unit of time, common to all segments of a path: in it the roots are
+        found.
 
     """
-    found = sorted(clusters(np.frombuffer(key)), key=lambda cluster: abs(cluster.centre))
+    scale = _scale(np.frombuffer(key), np.frombuffer(reference))
+    found = sorted(_spectrum(reference).clusters(scale), key=lambda cluster: abs(cluster.centre))
     groups: list[tuple[Block, bool]] = []
     rates: list[float] = []
     starts, ends = [], []
@@ -84,10 +94,11 @@ def segment_basis(key: bytes) -> SegmentBasis:
         if even.origin == 0:
             for block in (even, block_of(cluster, -1.0)):
                 groups.append((block, False))
-                starts.append(_derivatives(block, -1.0))
-                ends.append(_derivatives(block, 1.0))
+                at_start, at_end = _derivatives(block, _ENDS)
+                starts.append(at_start)
+                ends.append(at_end)
             continue
-        near, far = _derivatives(even, 0.0), _derivatives(even, -2.0)
+        far, near = _derivatives(even, _ENDS - 1.0)
         # Each solution by itself, not odd and even ones: a boundary layer stays at its own end.
         groups += [(even, False), (even, True)]
         starts += [far, _MIRRORED * near]
@@ -100,16 +111,28 @@ def segment_basis(key: bytes) -> SegmentBasis:
     )
 
 
-def _derivatives(block: Block, u: float) -> FloatArray:
-    """Return derivatives 0 to 11 of a block's solutions at a distance from their origin."""
+@lru_cache(maxsize=SPECTRA_KEPT)
+def _spectrum(reference: bytes) -> Spectrum:
+    """Return the roots of an equation in its reference unit of time."""
+    return Spectrum(np.frombuffer(reference))
+
+
+def _scale(coefficients: FloatArray, reference: FloatArray) -> float:
+    """Return the roots of an equation in units of those of the reference."""
+    # The lowest coefficient carries the highest power of the unit, and least of its rounding.
+    lowest = int(np.flatnonzero(reference)[0])
+    if lowest == CONDITIONS:
+        return 1.0
+    ratio = float(coefficients[lowest] / reference[lowest])
+    return float(ratio ** (0.5 / (CONDITIONS - lowest)))
+
+
+def _derivatives(block: Block, places: FloatArray) -> list[FloatArray]:
+    """Return derivatives 0 to 11 of a block's solutions at distances from their origin."""
     series = _ALONE[: len(block.columns)] if block.series is None else block.series
-    powers = u ** np.arange(series.shape[1], dtype=float)
-    # Leibniz's rule, one order at a time: (D + rate)^k applied to the series.
-    plain = np.einsum('rtk,t->rk', series_derivatives(series, SOLUTIONS - 1), powers)
-    binomial = np.zeros((SOLUTIONS, SOLUTIONS), dtype=complex)
-    with np.errstate(under='ignore'):
-        binomial[0, 0] = np.exp(block.rate * u)
-        for k in range(1, SOLUTIONS):
-            binomial[k] = block.rate * binomial[k - 1]
-            binomial[k, 1:] += binomial[k - 1, :-1]
-        return np.asarray((plain @ binomial.T).real)
+    powers = places[:, None] ** np.arange(series.shape[1])
+    plain = powers @ series_derivatives(series, SOLUTIONS - 1)  # (functions, places, 12)
+    factors = leibniz(block.rate, SOLUTIONS - 1).T
+    return [
+        (exp(block.rate * u) * plain[:, i] @ factors).real for i, u in enumerate(places.tolist())
+    ]

@@ -13,7 +13,7 @@ from flat_planner_ros.core.rejection import Reason, RequestRejected
 from flat_planner_ros.core.rest_start import RestStart
 from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.stopping import stop_plan
-from flat_planner_ros.core.takeover import Origin, takeover, too_late
+from flat_planner_ros.core.takeover import check_follows, Origin, takeover, too_late
 from flat_planner_ros.core.timeline import Motion, Timeline, Track
 import numpy as np
 
@@ -120,6 +120,8 @@ class PlannerSession:
         target = rest_target(goal, settings.joints)
         duration = settings.checked_duration(target.duration)
         origin = self._origin(goal.stamp, now)
+        if origin.before is not None:
+            check_follows(settings, self._timeline, self._rest.measured, now)
         timed = answer(settings, origin, target, duration)
         wanted = settings.options.strategy
         motion = Motion(

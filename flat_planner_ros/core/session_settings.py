@@ -68,6 +68,9 @@ class SessionSettings:
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
         The same while another motion is under way or waits for its start [s].
+    replan_tolerance
+        Largest distance of a measured actuated joint from what was planned for that time at which
+        another motion may take over [rad]; 0 for any.
     is_stamped
         Whether the executor plays a command at its stamp; if it plays on arrival, no motion can
         take over from another.
@@ -92,6 +95,7 @@ class SessionSettings:
     measurement_timeout: float = 0.5
     start_delay: float = 0.05
     lookahead: float = 0.1
+    replan_tolerance: float = 0.5
     is_stamped: bool = True
     execute: bool = True
 

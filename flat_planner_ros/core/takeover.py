@@ -2,7 +2,9 @@
 
 from typing import NamedTuple
 
+from flat_planner_ros.core.motion_record import JointSample
 from flat_planner_ros.core.rejection import Reason, RequestRejected
+from flat_planner_ros.core.session_settings import SessionSettings
 from flat_planner_ros.core.solutions import CONDITIONS
 from flat_planner_ros.core.timeline import Motion, Timeline
 import numpy as np
@@ -83,6 +85,55 @@ def takeover(timeline: Timeline, stamp: float | None, soonest: float) -> Origin:
         before.plan.jets(times)[:, :CONDITIONS, 0],
         before,
     )
+
+
+def check_follows(
+    settings: SessionSettings, timeline: Timeline, measured: JointSample | None, now: float
+) -> None:
+    """
+    Refuse a takeover while the arm is far from what it is planned to do.
+
+    Its executor has then lost the motion, restarted perhaps, and would refuse what continues it.
+    Without a fresh measured state there is nothing to compare.
+
+    Parameters
+    ----------
+    settings
+        With the tolerance.
+    timeline
+        What is planned.
+    measured
+        Last measured state, None before the first.
+    now
+        Present time [s].
+
+    Raises
+    ------
+    RequestRejected
+        An actuated joint is beyond the tolerance.
+
+    """
+    limit = settings.replan_tolerance
+    if limit == 0.0 or measured is None:
+        return
+    motion = timeline.at(measured.time)
+    is_fresh = abs(now - measured.time) <= settings.measurement_timeout
+    # What was planned before the first motion left is not known any more.
+    if not is_fresh or motion is None or measured.time < motion.start:
+        return
+    planned = motion.reference(measured.time).positions[0]
+    actuated = zip(settings.joints[:-1], measured.positions, planned, strict=False)
+    for name, position, reference in actuated:
+        if abs(position - reference) > limit:
+            raise RequestRejected(
+                Reason.START_STATE_MISMATCH,
+                f'{name} is measured at {position:.4g} rad, but motion {motion.plan_id} is then '
+                f'at {reference:.4g} rad (replan.tolerance {limit:g} rad): the arm does not carry '
+                f'it out, call ~/stop or wait for its end at {motion.end:.3f} s',
+                joint=name,
+                value=float(position),
+                limit=limit,
+            )
 
 
 def too_late(stamp: float, now: float) -> RequestRejected:

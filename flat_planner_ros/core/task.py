@@ -111,7 +111,7 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     cost = strategy_cost(
         options.strategy, mapping, r=options.r, p=options.p, custom=options.custom
     )
-    half = 0.5 * duration
+    half = 0.5 * float(duration)
     powers = half**_ORDERS
     with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
         unit = unit_motion(cost.characteristic() * powers[::-1] ** 2)
@@ -120,7 +120,8 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     # (35) with every derivative in units of the half duration.
     cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
     # A law that is no minimum, which its certificate refuses, might have a negative cost.
-    reach = min(MAX_NUMBER / largest, (MAX_NUMBER / cost_value) ** 0.5) if cost_value > 0 else 0.0
+    # Roots first: a cost of less than 1e-8 would take the quotient out of range.
+    reach = min(MAX_NUMBER / largest, MAX_NUMBER**0.5 / cost_value**0.5) if cost_value > 0 else 0.0
     return Task(
         arm=arm,
         duration=duration,

@@ -124,7 +124,8 @@ def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
     coefficients = cost.characteristic()
     halves = 0.5 * np.diff(path.edges)
     powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
-    bases = [segment_basis(key.tobytes()) for key in rounded(coefficients * powers)]
+    reference = _reference(coefficients).tobytes()
+    bases = [segment_basis(key.tobytes(), reference) for key in rounded(coefficients * powers)]
     # Each segment counts from the value at its start: only steps enter the equations, and a short
     # segment far from zero loses no digits.
     origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
@@ -168,6 +169,15 @@ def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
         boundary_residual=boundary,
         optimality_residual=optimality,
     )
+
+
+def _reference(coefficients: FloatArray) -> FloatArray:
+    """Return an equation in units of time, a power of two, in which its roots are of size 1."""
+    sizes = np.abs(coefficients[-2::-1]).tolist()
+    largest = max(size ** (0.5 / n) for n, size in enumerate(sizes, start=1))
+    unit = 2.0 ** -round(log2(largest)) if largest else 1.0
+    reference: FloatArray = coefficients * unit ** np.arange(SOLUTIONS, -1.0, -2.0)
+    return reference
 
 
 def _weights(

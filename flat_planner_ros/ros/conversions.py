@@ -22,6 +22,7 @@ from flat_planner_ros.core import (
     select,
     Track,
 )
+from flat_planner_ros.ros.point_reader import FIELDS, PointTable, read_points
 from flat_planner_ros.ros.point_writer import NANOSECONDS, trajectory_bytes
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,51 @@ def message_of(data: bytes, message_type: type[Message]) -> Message:
             value=float(len(data)),
             limit=float(MAX_GOAL_BYTES),
         )
-    return deserialize_message(data, message_type)
+    try:
+        return deserialize_message(data, message_type)
+    except RuntimeError as error:
+        raise RequestRejected(
+            Reason.INVALID_GOAL, f'the goal cannot be read: {_first_line(error)}'
+        ) from error
+
+
+def points_of(data: bytes) -> PointTable:
+    """
+    Return a serialised trajectory as tables.
+
+    Raises
+    ------
+    InvalidRequest
+        It is no trajectory.
+
+    """
+    points = read_points(data)
+    if points is not None:
+        return points
+    try:
+        return points_of_message(deserialize_message(data, JointTrajectory))
+    except RuntimeError as error:
+        raise InvalidRequest(f'it cannot be read: {_first_line(error)}') from error
+
+
+def points_of_message(msg: JointTrajectory) -> PointTable:
+    """Return a trajectory as tables; arrays that do not fit the joints are told, not raised."""
+    count, fields, misfits = len(msg.joint_names), {}, {}
+    for field in FIELDS:
+        rows = [getattr(point, field) for point in msg.points]
+        width = count if any(map(len, rows)) else 0
+        odd = next((i for i, row in enumerate(rows) if len(row) != width), None)
+        if odd is None:
+            fields[field] = np.array(rows, dtype=float).reshape(len(rows), width)
+        else:
+            misfits[field] = f'point {odd} has {len(rows[odd])} {field} for {count} joints'
+    return PointTable(
+        joint_names=tuple(msg.joint_names),
+        stamp=seconds(msg.header.stamp),
+        times=np.array([seconds(point.time_from_start) for point in msg.points], dtype=float),
+        fields=fields,
+        misfits=misfits,
+    )
 
 
 def goal_from_trajectory(msg: JointTrajectory) -> Goal:
@@ -177,6 +222,11 @@ def is_stamped(msg: JointState) -> bool:
 
 
 def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
+    """Return the motion that a plan states; see `planned_motion`."""
+    return planned_motion(points_of_message(msg))
+
+
+def planned_motion(points: PointTable) -> PlannedMotion:
     """
     Return the motion that a plan states.
 
@@ -190,28 +240,25 @@ def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
         The message is no complete, finite motion with an absolute start.
 
     """
-    start = _stamp(msg)
-    if start is None:
+    if not points.stamp:
         raise InvalidRequest('a plan needs the absolute time of its start in header.stamp')
     return PlannedMotion(
-        joint_names=tuple(msg.joint_names),
-        start=start,
-        times=_times(msg),
-        positions=_table(msg, 'positions'),
-        velocities=_optional_table(msg, 'velocities'),
-        efforts=_optional_table(msg, 'effort'),
+        joint_names=points.joint_names,
+        start=points.stamp,
+        times=points.times,
+        positions=_table(points, 'positions'),
+        velocities=_optional_table(points, 'velocities'),
+        efforts=_optional_table(points, 'effort'),
     )
 
 
-def profile_from_trajectory(
-    msg: JointTrajectory, joints: Sequence[str], now: float
-) -> EffortProfile:
+def effort_profile(points: PointTable, joints: Sequence[str], now: float) -> EffortProfile:
     """
-    Return the command that a trajectory message states.
+    Return the command that a trajectory states.
 
     Parameters
     ----------
-    msg
+    points
         Joints in any order, the passive one with zero effort or left out; stamp 0 means now.
     joints
         The plant's joints, the passive one last.
@@ -221,17 +268,17 @@ def profile_from_trajectory(
     Raises
     ------
     InvalidCommand
-        The message cannot be played as it stands.
+        The trajectory cannot be played as it stands.
 
     """
-    names = list(msg.joint_names)
+    names = list(points.joint_names)
     if sorted(names) not in (sorted(joints), sorted(joints[:-1])):
         raise InvalidCommand(f'joints are {names}, expected {list(joints)}')
     try:
-        efforts = _table(msg, 'effort')
-        positions = _optional_table(msg, 'positions')
-        velocities = _optional_table(msg, 'velocities')
-        accelerations = _optional_table(msg, 'accelerations')
+        efforts = _table(points, 'effort')
+        positions = _optional_table(points, 'positions')
+        velocities = _optional_table(points, 'velocities')
+        accelerations = _optional_table(points, 'accelerations')
     except InvalidRequest as error:
         raise InvalidCommand(str(error)) from error
     if joints[-1] in names and efforts[:, names.index(joints[-1])].any():
@@ -245,10 +292,9 @@ def profile_from_trajectory(
         if table is not None and not np.isfinite(table).all():
             raise InvalidCommand(f'{field} must be finite')
     actuated = select(names, joints[:-1])
-    stamp = _stamp(msg)
     return EffortProfile(
-        start=now if stamp is None else stamp,
-        times=_times(msg),
+        start=points.stamp or now,
+        times=points.times,
         efforts=efforts[:, actuated],
         positions=None if positions is None else positions[:, actuated],
         velocities=None if velocities is None else velocities[:, actuated],
@@ -339,26 +385,26 @@ def _stamp(msg: JointTrajectory | JointState) -> float | None:
     return seconds(msg.header.stamp) or None
 
 
-def _times(msg: JointTrajectory) -> FloatArray:
-    """Return the times of all points [s]."""
-    return np.array([seconds(point.time_from_start) for point in msg.points])
+def _first_line(error: Exception) -> str:
+    """Return what an error says, in one line."""
+    return str(error).partition('\n')[0]
 
 
-def _table(msg: JointTrajectory, field: str) -> FloatArray:
+def _table(points: PointTable, field: str) -> FloatArray:
     """Return one field of all points, shape (points, joints)."""
-    rows = [getattr(point, field) for point in msg.points]
-    count = len(msg.joint_names)
-    for index, row in enumerate(rows):
-        if len(row) != count:
-            raise InvalidRequest(f'point {index} has {len(row)} {field} for {count} joints')
-    return np.array(rows, dtype=float).reshape(len(rows), count)
+    if field in points.misfits:
+        raise InvalidRequest(points.misfits[field])
+    table, count = points.fields[field], len(points.joint_names)
+    if len(table) and table.shape[1] != count:
+        raise InvalidRequest(f'point 0 has {table.shape[1]} {field} for {count} joints')
+    return table.reshape(len(table), count)
 
 
-def _optional_table(msg: JointTrajectory, field: str) -> FloatArray | None:
+def _optional_table(points: PointTable, field: str) -> FloatArray | None:
     """Return one field of all points, None where no point has it."""
-    if not any(len(getattr(point, field)) for point in msg.points):
+    if field in points.fields and not points.fields[field].shape[1]:
         return None
-    return _table(msg, field)
+    return _table(points, field)
 
 
 def _optional(values: array, count: int, indices: NDArray[np.intp] | slice) -> FloatArray | None:

@@ -55,7 +55,8 @@ class MonitorNode(Node):
         self._health = publish(DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE)
         plan = interfaces.of(interfaces.PLANNER, interfaces.PLAN)
         listen = self.create_subscription
-        listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED)
+        # As bytes: the points of a long plan would take a second to become Python objects.
+        listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED, raw=True)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
         status = interfaces.of(interfaces.PLANNER, interfaces.STATUS)
         listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
@@ -88,10 +89,10 @@ class MonitorNode(Node):
         """Judge with changed parameters from now on."""
         self._monitor.settings = settings
 
-    def _on_plan(self, msg: JointTrajectory) -> None:
+    def _on_plan(self, data: bytes) -> None:
         """Take a plan, for whatever joints it names."""
         try:
-            motion = conversions.planned_motion_from_trajectory(msg)
+            motion = conversions.planned_motion(conversions.points_of(data))
         except FlatPlannerError as error:
             self.get_logger().warning(f'plan ignored: {error}')
             return

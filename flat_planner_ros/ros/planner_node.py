@@ -1,6 +1,7 @@
 """Planner node: goals in, certified flat motions and verdicts out (docs/interfaces.md)."""
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 import sys
 from time import perf_counter
 
@@ -19,6 +20,7 @@ from flat_planner_ros.ros.model_adoption import ModelAdoption
 from flat_planner_ros.ros.node_runner import run
 from flat_planner_ros.ros.parameters import NodeParameters
 from flat_planner_ros.ros.planner_parameters import build, PlannerSettings, ROWS
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -27,6 +29,12 @@ from trajectory_msgs.msg import JointTrajectory
 
 WARNING_PERIOD = 5.0
 """Shortest time between two warnings about the same input [s]."""
+
+LIBRARIES = ('scipy.linalg.lapack', 'scipy.optimize')
+"""What planning through via points or in motion loads when it first needs it."""
+
+LOADING_DELAY = 0.001
+"""Time after which the libraries are loaded [s]; in the executor, when the node is ready."""
 
 
 class PlannerNode(Node):
@@ -63,6 +71,9 @@ class PlannerNode(Node):
         commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
         self._watch = GraphWatch(self, commands, [interfaces.JOINT_STATES], is_listening=True)
         self._apply(self._settings)
+        # Now, as nothing moves yet: in motion, half a second more would be too late for a start.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._loading = self.create_timer(LOADING_DELAY, self._load, clock=steady)
 
     def destroy_node(self) -> None:
         """End the stream of efforts with zeros, then the node."""
@@ -87,6 +98,12 @@ class PlannerNode(Node):
         """Plan the next goals with changed parameters."""
         self._session.settings = settings.session
         self._efforts.configure(settings.stream_effort, settings.session.period)
+
+    def _load(self) -> None:
+        """Load, once, what planning can need."""
+        self._loading.cancel()
+        for library in LIBRARIES:
+            import_module(library)
 
     def _on_goal(self, data: bytes) -> None:
         """Answer a goal given as a trajectory."""

@@ -186,6 +186,13 @@ ROWS = [
         upper=10.0,
     ),
     Row(
+        name='replan.tolerance',
+        default=0.5,
+        description='distance of a measured actuated joint from the running motion beyond which '
+        'no other takes over [rad]; 0 = any',
+        lower=0.0,
+    ),
+    Row(
         name='execute',
         default=True,
         description='publish commands; false = plan and report only',
@@ -287,6 +294,7 @@ def build(values: Values) -> PlannerSettings:
         measurement_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
+        replan_tolerance=values['replan.tolerance'],
         is_stamped=values['command.stamp'] == 'absolute',
         execute=values['execute'],
     )

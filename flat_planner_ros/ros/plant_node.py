@@ -64,7 +64,9 @@ class PlantNode(Node):
             CommandInput.EFFORT: (interfaces.EFFORT_COMMANDS, Float64MultiArray, self._on_effort),
         }[self._settings.command_input]
         name = interfaces.of(interfaces.PLANNER, topic)
-        self.create_subscription(kind, name, callback, interfaces.RELIABLE)
+        # As bytes: the points of a long command would take a second to become Python objects.
+        raw = callback == self._on_trajectory
+        self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)
         clock = [interfaces.CLOCK] if self._settings.publish_clock else []
         GraphWatch(self, [name, *clock], [interfaces.JOINT_STATES])
 
@@ -73,16 +75,17 @@ class PlantNode(Node):
         self._catch_up()
         self._arm.settings = settings.simulation
 
-    def _on_trajectory(self, msg: JointTrajectory) -> None:
+    def _on_trajectory(self, data: bytes) -> None:
         """Play a command; one that cannot be played leaves the running one alone."""
         self._catch_up()
         try:
-            if not msg.points:
+            points = conversions.points_of(data)
+            if not len(points.times):
                 raise InvalidCommand(
                     'it is empty; to end a motion call ~/reset, or ~/stop of the planner'
                 )
             joints = self._settings.joints
-            profile = conversions.profile_from_trajectory(msg, joints, self._arm.time)
+            profile = conversions.effort_profile(points, joints, self._arm.time)
             remark = self._arm.command(profile)
         except FlatPlannerError as error:
             self.get_logger().warning(f'trajectory ignored: {error}')

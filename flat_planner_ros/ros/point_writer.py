@@ -58,8 +58,9 @@ def trajectory_bytes(
     front = b''.join([ENCAPSULATION, STAMP.pack(*stamp), _string(''), *text])
     # Every point but the first begins where one ends, hence they are all aligned alike.
     body = len(front) - len(ENCAPSULATION)
-    first = _point_type(body, tables)
-    other = _point_type(body + first.itemsize, tables)
+    widths = [table.shape[1] for table in tables] + [0] * (ARRAYS - len(tables))
+    first = point_type(body, widths)
+    other = point_type(body + first.itemsize, widths)
     rest = len(front) + first.itemsize
     message = np.zeros(rest + (len(times) - 1) * other.itemsize, dtype=np.uint8)
     message[: len(front)] = np.frombuffer(front, dtype=np.uint8)
@@ -68,9 +69,10 @@ def trajectory_bytes(
         (message[len(front) : rest].view(first), slice(1)),
         (message[rest:].view(other), slice(1, None)),
     ):
-        for field, table in enumerate(tables):
-            points[f'length{field}'] = table.shape[1]
-            points[f'values{field}'] = table[part]
+        for field, (width, table) in enumerate(zip(widths, tables, strict=False)):
+            points[f'length{field}'] = width
+            if width:
+                points[f'values{field}'] = table[part]
         points['sec'], points['nanosec'] = seconds[part], nanoseconds[part]
     return message.tobytes()
 
@@ -81,14 +83,26 @@ def _string(text: str) -> bytes:
     return LENGTH.pack(len(encoded)) + encoded + bytes(-len(encoded) % LENGTH.size)
 
 
-def _point_type(start: int, tables: Sequence[FloatArray]) -> np.dtype:
-    """Return the type of a point that begins at an offset."""
+def point_type(start: int, widths: Sequence[int], order: str = '=') -> np.dtype:
+    """
+    Return the type of a point that begins at an offset.
+
+    Parameters
+    ----------
+    start
+        Offset from the end of the encapsulation.
+    widths
+        Numbers in each of the four arrays; one without any is a length alone, unaligned.
+    order
+        Byte order as in struct: '=', '<' or '>'.
+
+    """
     entries: list[tuple[str, object]] = []
-    for field in range(ARRAYS):
-        entries.append((f'length{field}', 'u4'))
-        if field < len(tables):
-            entries.append((f'values{field}', ('f8', tables[field].shape[1:])))
-    entries += [('sec', 'i4'), ('nanosec', 'u4')]
+    for field, width in enumerate(widths):
+        entries.append((f'length{field}', f'{order}u4'))
+        if width:
+            entries.append((f'values{field}', (f'{order}f8', (width,))))
+    entries += [('sec', f'{order}i4'), ('nanosec', f'{order}u4')]
     names, kinds = zip(*entries, strict=True)
     formats, offsets, at = [np.dtype(kind) for kind in kinds], [], start
     for entry in formats:

@@ -271,3 +271,25 @@ def test_accepts_the_ends_of_the_range(paper_arm, value):
 def test_custom_needs_its_matrix(paper_arm):
     with pytest.raises(InvalidCost, match=r'weights\.Q'):
         strategy_cost(Strategy.CUSTOM, flat_map(paper_arm, FlatModel.APPROXIMATE))
+
+
+@pytest.mark.parametrize('stiffness', [5e-324, 1e-300, 1e-160, 1e-120])
+@pytest.mark.parametrize('model', FlatModel)
+def test_refuses_arms_with_absurd_numbers_without_a_warning(stiffness, model):
+    arm = PlanarArm.reduced(inertia_star=(1.0, 0.5), stiffness=stiffness, damping=1.0)
+    with np.errstate(all='ignore'):
+        mapping = flat_map(arm, model)
+    with np.errstate(over='raise', invalid='raise'), pytest.raises(InvalidCost, match='no arm'):
+        strategy_cost(Strategy.MIN_CONTROL_EFFORT, mapping, r=1000.0)
+
+
+def test_refuses_entries_out_of_range_without_a_warning():
+    with np.errstate(over='raise', invalid='raise'):
+        for value in (1e201, 1.7e308):
+            with pytest.raises(InvalidCost, match='beyond'):
+                QuadraticCost(matrix=np.diag([value, 1.0, 1.0, 1.0, 1.0, 1.0]))
+        matrix = np.diag([5e-324, 1e-300, 1.0, 1.0, 1.0, 1.0])
+        assert np.isfinite(QuadraticCost(matrix=matrix).characteristic()).all()
+        matrix[0, 1] = matrix[1, 0] = 1.0
+        with pytest.raises(InvalidCost, match='indefinite'):
+            QuadraticCost(matrix=matrix)

@@ -11,6 +11,7 @@ from flat_planner_ros.core.extremal import extremal, Jets
 from flat_planner_ros.core.flatness import FlatModel
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
 from flat_planner_ros.core.rollout import EffortProfile, rollout
+from flat_planner_ros.core.task import task_of
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
@@ -260,6 +261,32 @@ def test_refuses_what_leaves_double_precision(paper_arm, distance, duration):
     request = MotionRequest(start=[0.0, 0.0], final=[distance, 0.0], duration=duration)
     with pytest.raises(UncertifiedPlan):
         plan(request, paper_arm, STRATEGIES['polynomial'])
+
+
+@pytest.mark.parametrize('weight', [0.0, 1.0, 1000.0])
+@pytest.mark.parametrize('duration', [np.float64(600.0), np.float64(1e5)])
+def test_costs_of_long_motions_do_not_overflow(paper_arm, duration, weight):
+    """A warning of NumPy would fail the test; the cost of 1 rad is far below 1e-8."""
+    for name in Strategy:
+        if name in (Strategy.CUSTOM, Strategy.INSENSITIVE):
+            continue
+        options = PlanningOptions(strategy=name, r=weight, p=weight)
+        with np.errstate(all='raise', under='ignore'):
+            task = task_of(paper_arm, options, duration)
+        assert 0.0 < task.reach < np.inf
+        if weight == 0.0:
+            assert task.cost_value < 1e-8
+
+
+def test_lost_roots_are_a_refusal():
+    """Roots that differ by 17 orders of magnitude, some of them next to the imaginary axis."""
+    arm = PlanarArm.reduced(inertia_star=(1.0, 0.5), stiffness=0.001, damping=0.02)
+    request = MotionRequest(start=np.zeros(2), final=np.array([1.0, 0.0]), duration=600.0)
+    options = PlanningOptions(
+        strategy=Strategy.MIN_CONTROL_EFFORT, r=1000.0, flat_model=FlatModel.APPROXIMATE
+    )
+    with pytest.raises(UncertifiedPlan):
+        plan(request, arm, options)
 
 
 @pytest.mark.parametrize('name', STRATEGIES)

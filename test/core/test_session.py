@@ -221,6 +221,48 @@ def test_a_goal_in_motion_takes_over_without_a_step():
     assert planner.ended(second.end) == [(second, Outcome.FINISHED)]
 
 
+def test_no_motion_takes_over_from_one_that_the_arm_does_not_carry_out():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    now = first.start + 0.9
+    planned = first.reference(now - 0.01).positions[0]
+    assert planned[0] - 0.5 > SETTINGS.replan_tolerance
+    planner.measure(sample(time=now - 0.01))  # back at the start, as a restarted plant is
+    for goal in (BACK, planner.last_goal, replace(BACK, stamp=first.end + 1.0)):
+        error = reason_of(planner.submit, goal, now)
+        assert error.reason is Reason.START_STATE_MISMATCH
+        assert (error.joint, error.value, error.limit) == ('joint1', 0.5, 0.5)
+        assert 'replan.tolerance' in str(error)
+        assert planner.motion is first
+    # At its own time the sample is where it should be, and the elastic joint may be anywhere.
+    earlier = first.reference(now - 0.3).positions[0]
+    assert abs(earlier - first.reference(now).positions[0]).max() > 0.5
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    planner.measure(sample(position=(earlier[0], 3.0), time=now - 0.3))
+    assert planner.submit(BACK, now).plan_id == 2
+
+
+@pytest.mark.parametrize(
+    ('changes', 'age'),
+    [({'replan_tolerance': 0.0}, 0.01), ({}, 0.501), ({'measurement_timeout': 2.0}, 0.95)],
+)
+def test_only_a_fresh_state_of_its_time_tells_that_the_arm_is_elsewhere(changes, age):
+    planner = session(**changes)
+    first = planner.submit(GOAL, NOW)
+    now = first.start + 0.9
+    planner.measure(sample(position=(-3.0, 0.0), time=now - age))
+    assert planner.submit(BACK, now).plan_id == 2
+
+
+def test_a_stop_is_planned_wherever_the_arm_is():
+    planner = session()
+    first = planner.submit(GOAL, NOW)
+    now = first.start + 0.5
+    planner.measure(sample(position=(-3.0, 0.0), time=now))
+    assert planner.stop(now).stops
+
+
 def test_two_goals_within_a_period_of_the_command_take_over_at_the_same_time():
     planner = session()
     first = planner.submit(GOAL, NOW)

@@ -306,7 +306,8 @@ def test_what_cannot_be_played_is_ignored_and_the_running_motion_untouched(graph
     names = plant.states[0].name
     undisturbed = PacedArm(plant.node._arm.settings)
     samples = undisturbed.follow(100.0)
-    undisturbed.command(conversions.profile_from_trajectory(command, names, 100.0))
+    points = conversions.points_of_message(command)
+    undisturbed.command(conversions.effort_profile(points, names, 100.0))
     for time in (100.9, 101.8, 102.7, 103.0):
         samples += undisturbed.follow(time)
     count = len(plant.states)
