@@ -1,3 +1,17 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """ROS's own linters, where they are installed, and what they cannot tell."""
 
 from configparser import ConfigParser
@@ -8,15 +22,11 @@ import shutil
 import subprocess
 from xml.etree import ElementTree
 
+from license_header import FOLDERS, without_header
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 CONFIGURATION = Path(__file__).with_name('flake8.ini')
-FOLDERS = ('benchmarks', 'docs', 'examples', 'flat_planner_ros', 'launch', 'test')
-FILES = [
-    CHECKOUT / 'setup.py',
-    *(path for folder in FOLDERS for path in sorted((CHECKOUT / folder).rglob('*.py'))),
-]
 FORMAT_3 = {
     'name',
     'version',
@@ -93,6 +103,10 @@ def test_pep257_as_ros_has_it(checkout):
 def test_copyright_as_ros_has_it(checkout):
     linter = pytest.importorskip('ament_copyright.main')
     assert linter.main([*FOLDERS, 'setup.py']) == 0
+
+
+def test_every_file_has_the_licence_header():
+    assert not without_header(), 'run python test/license_header.py'
 
 
 def test_the_configuration_is_that_of_ros_but_for_slices():
