@@ -271,7 +271,8 @@ def test_nearly_coincident_times_are_right_or_refused(costs, oracle, name, relax
         assert gap < 1e-4
         return
     if max(found.boundary_residual, found.optimality_residual) > TOLERANCE:
-        assert gap < 2e-4  # where exactly depends on the rounding of the linear algebra at hand
+        # Another LAPACK (NumPy 1.26) rounds worse by a decade than that of NumPy 2.4.
+        assert gap < 2e-4
         return
     roots = oracle.square_roots(costs[name].characteristic())
     reference = path_oracle.solve_path(

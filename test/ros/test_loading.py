@@ -21,7 +21,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-PROGRAMS = ('planner_node', 'plant_node', 'monitor_node')
+PROGRAMS = ('planner_node', 'monitor_node', 'plant_node')
 
 
 def has_loaded(process, part: str) -> bool:
@@ -29,12 +29,15 @@ def has_loaded(process, part: str) -> bool:
     return part in Path(f'/proc/{process.pid}/maps').read_text()
 
 
-def test_only_the_planner_loads_what_paths_need_and_before_the_first(graph):
-    planner, *others = [
+def test_planner_and_monitor_load_before_the_first_motion_what_it_will_need(graph):
+    planner, monitor, plant = [
         graph.run([sys.executable, '-m', f'flat_planner_ros.ros.{name}']) for name in PROGRAMS
     ]
-    for process in (planner, *others):
+    for process in (planner, monitor, plant):
         graph.expect(lambda process=process: 'ready' in process.stderr + process.stdout, 'a node')
-    for library in ('scipy/linalg', 'scipy/optimize'):
-        graph.expect(lambda library=library: has_loaded(planner, library), library)
-    assert not any(has_loaded(process, 'scipy/') for process in others)
+    for process in (planner, monitor):
+        for library in ('scipy/linalg', 'scipy/optimize'):
+            graph.expect(
+                lambda process=process, library=library: has_loaded(process, library), library
+            )
+    assert not has_loaded(plant, 'scipy/optimize')
