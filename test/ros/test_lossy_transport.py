@@ -202,6 +202,8 @@ def test_a_command_that_was_overtaken_does_not_take_over_again(graph):
         target='/bad/joint_trajectory',
         kind=JointTrajectory,
         remap='flat_plant:flat_planner/joint_trajectory:=/bad/joint_trajectory',
+        # The third command goes on from the second, which the plant has not heard of yet.
+        start_tolerance=10.0,
     )
     first = lossy.send(2.0, 2.0)
     lossy.wait_until(float(first['start_time']) + 0.3)

@@ -16,10 +16,6 @@
 
 import struct
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.core import FlatPlannerError, InvalidRequest, RequestRejected
 from flat_planner_ros.ros import conversions
@@ -28,6 +24,7 @@ from flat_planner_ros.ros.point_writer import trajectory_bytes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
+import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint

@@ -31,8 +31,8 @@ import sys
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from ros.conftest import free_domain, Graph
-from soak.rig import Rig
+from ros.conftest import free_domain, Graph  # noqa: E402  From the directory of tests.
+from soak.rig import Rig  # noqa: E402
 
 RIGS = {
     '2-DOF, 2 x real time': ('arm_2dof.yaml', 2.0),
