@@ -14,6 +14,8 @@
 
 """What the core refuses, and with which numbers."""
 
+import numpy as np
+
 
 class FlatPlannerError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -95,3 +97,8 @@ class UncertifiedPlan(FlatPlannerError):
 
 class InvalidCommand(FlatPlannerError):
     """The commanded trajectory cannot be played."""
+
+
+def strict_arithmetic() -> np.errstate:
+    """Return a context in which numbers that leave double precision raise ArithmeticError."""
+    return np.errstate(over='raise', invalid='raise', divide='raise', under='ignore')

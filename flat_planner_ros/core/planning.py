@@ -21,7 +21,7 @@ from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.certified_plan import BOUNDARY_TOLERANCE, Plan
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.course import Course, FreeCourse, Law, RestToRest
-from flat_planner_ros.core.errors import InvalidRequest, UncertifiedPlan
+from flat_planner_ros.core.errors import InvalidRequest, strict_arithmetic, UncertifiedPlan
 from flat_planner_ros.core.flatness import FlatModel
 from flat_planner_ros.core.moving_start import laws_to_rest
 from flat_planner_ros.core.plan_samples import PlanSamples
@@ -119,7 +119,7 @@ def _from_motion(
         # It has no law from a start in motion; the task's cost is the polynomial one.
         options = replace(options, strategy=Strategy.POLYNOMIAL)
     final = np.array(planned_at_rest(request.final))
-    with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
+    with strict_arithmetic():
         found = laws_to_rest(task, start, final)
     return Plan(
         request=request,

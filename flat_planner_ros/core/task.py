@@ -19,6 +19,7 @@ from functools import cached_property, lru_cache
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import QuadraticCost, strategy_cost
+from flat_planner_ros.core.errors import strict_arithmetic
 from flat_planner_ros.core.flatness import flat_map, FlatMap
 from flat_planner_ros.core.request import PlanningOptions
 from flat_planner_ros.core.solutions import CONDITIONS
@@ -127,7 +128,7 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     )
     half = 0.5 * float(duration)
     powers = half**_ORDERS
-    with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
+    with strict_arithmetic():
         unit = unit_motion(cost.characteristic() * powers[::-1] ** 2)
         rates = 1.0 / powers
         largest = float((rates * unit.peaks).max())

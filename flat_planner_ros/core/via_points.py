@@ -26,7 +26,7 @@ from math import ceil, log2
 
 from flat_planner_ros.core.cost import QuadraticCost
 from flat_planner_ros.core.coupling import coupling, Weights
-from flat_planner_ros.core.errors import InvalidRequest
+from flat_planner_ros.core.errors import InvalidRequest, strict_arithmetic
 from flat_planner_ros.core.extremal import momentum_of, stationarity_residual
 from flat_planner_ros.core.motion_law import MotionLaw
 from flat_planner_ros.core.moving_start import MAX_DERIVATIVE
@@ -129,7 +129,7 @@ def optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
         The numbers leave double precision.
 
     """
-    with np.errstate(over='raise', invalid='raise', divide='raise', under='ignore'):
+    with strict_arithmetic():
         return _optimal_path(cost, path)
 
 

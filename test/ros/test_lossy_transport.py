@@ -22,6 +22,7 @@ from flat_planner_ros.ros import conversions, interfaces
 import numpy as np
 import pytest
 from ros.relay import Faults, Relay
+from ros.world import stamp, values
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -40,16 +41,6 @@ def goal(position, duration=0.8):
     point = JointTrajectoryPoint(positions=[float(position)])
     point.time_from_start = conversions.duration_msg(duration)
     return JointTrajectory(joint_names=['joint1'], points=[point])
-
-
-def values(msg):
-    """Return the values of a message's only status."""
-    return {pair.key: pair.value for pair in msg.status[0].values}
-
-
-def stamp(msg):
-    """Return when a message is stamped [s]."""
-    return conversions.seconds(msg.header.stamp)
 
 
 class Lossy:
