@@ -70,6 +70,13 @@ LATCHED_HISTORY = QoSProfile(
 )
 """The last verdicts, also for those who come later."""
 
+VERDICTS = QoSProfile(
+    depth=256,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+"""Verdicts as the planner gives them: none is lost of as many goals as may wait at once."""
+
 SENSOR_DATA = qos_profile_sensor_data
 """Measurements: the newest counts; also hears best-effort publishers."""
 

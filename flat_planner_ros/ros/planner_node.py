@@ -67,7 +67,7 @@ class PlannerNode(Node):
         efforts = publish(Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE)
         self._efforts = EffortStream(self, efforts, self._session)
         self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
-        self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.LATCHED_HISTORY)
+        self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.VERDICTS)
         listen = self.create_subscription
         # As bytes: a message that is too long is refused before it takes seconds to be read.
         for kind, topic, heard in (

@@ -20,7 +20,8 @@ class StampClock:
     The time of the joint states' stamps, carried on by another clock while none come.
 
     The two clocks may differ: a simulator or a recording stamps in its own time. Before the first
-    joint state the other clock stands for both.
+    joint state the other clock stands for both. A simulated clock shows 0 until it is first heard;
+    that is no time, and what follows it is no silence.
 
     Attributes
     ----------
@@ -37,6 +38,8 @@ class StampClock:
 
     def now(self, other: float) -> float:
         """Return the present time of the stamps, given that of the other clock [s]."""
+        if not other:
+            return self.stamp or 0.0
         if self.stamp is not None and self.stamp != self._seen:
             self._seen = self.stamp
             self._offset = self.stamp - other

@@ -46,7 +46,7 @@ EXAMPLES = """\
 examples:
   tradeoff --final 3.14 0 --duration 1 --plot tradeoff.png
   tradeoff --params-file arm.yaml --final 1.5 0 --duration 0.8 --csv tradeoff.csv
-  tradeoff --final 3.14 0 --duration 1 --stretch 1 1.05 --set insensitivity.stiffness:=0.2
+  tradeoff --final 3.14 0 --duration 1 --stretch 1 1.05 -p insensitivity.stiffness:=0.2
 """
 
 
@@ -89,7 +89,8 @@ def _options(args: Sequence[str] | None) -> Namespace:
     add = parser.add_argument
     add('--params-file', metavar='FILE', type=Path, help='of the planner node; else its defaults')
     add(
-        '--set',
+        '-p',
+        '--parameter',
         metavar='NAME:=VALUE',
         action='append',
         default=[],
@@ -130,7 +131,7 @@ def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
         planner_parameters.ROWS,
         planner_parameters.build,
         node=interfaces.PLANNER,
-        overrides=options.set,
+        overrides=options.parameter,
         warn=lambda text: print(f'tradeoff: {text}', file=sys.stderr),
     ).session
     arm, planning = settings.arm, settings.options

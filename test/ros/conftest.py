@@ -40,7 +40,7 @@ with suppress(ImportError):  # without ROS every test here is skipped (test/conf
     from rclpy.parameter_client import AsyncParameterClient
     from rclpy.qos import DurabilityPolicy, QoSProfile
 
-TIMEOUT = 10.0
+TIMEOUT = 60.0
 """Time in which anything must happen that happens at all [s]; on an idle machine it is 10 ms."""
 
 DOMAINS = range(50, 100)
@@ -228,7 +228,7 @@ class Graph:
         assert self.spin_until(condition, timeout), f'not within {timeout:g} s: {what}'
 
     def collect(
-        self, message_type: type, topic: str, qos: Any = 10, *, matched: bool = True
+        self, message_type: type, topic: str, qos: Any = 1000, *, matched: bool = True
     ) -> list[Any]:
         """Return a list that grows with every message; wait for a publisher unless told not to."""
         messages: list[Any] = []

@@ -35,7 +35,7 @@ def test_a_burst_of_200_goals_gets_200_verdicts_in_order(graph):
     count = len(world.answers())
     for number in range(200):
         graph.publish('/flat_planner/goal', goal(0.01 * number))
-    graph.expect(lambda: len(world.answers()) >= count + 200, '200 verdicts', timeout=90.0)
+    graph.expect(lambda: len(world.answers()) >= count + 200, '200 verdicts')
     graph.spin_until(lambda: False, 0.3)  # and none too many
     burst = world.answers()[count:]
     asked = [json.loads(v['goal.positions'])[0] for v in burst]
@@ -137,11 +137,14 @@ def test_a_clock_that_stops_stops_the_motion_and_ends_it_when_it_goes_on(graph):
     world = World(graph, arguments=clock)
 
     def show(now):
-        """Publish a time and wait until the arm has followed."""
-        graph.publish('/clock', Clock(clock=conversions.time_msg(now)), readers=3)
-        graph.expect(
-            lambda: world.states and stamp(world.states[-1]) > now - 0.03, f'the arm at {now}'
-        )
+        """Publish a time until the arm has followed."""
+
+        def has_followed():
+            # Again and again: nodes hear a clock by best effort, and the first of it may be lost.
+            graph.publish('/clock', Clock(clock=conversions.time_msg(now)), readers=3)
+            return world.states and stamp(world.states[-1]) > now - 0.03
+
+        graph.expect(has_followed, f'the arm at {now}')
 
     def run(until):
         """Let time go on, no faster than the arm follows."""

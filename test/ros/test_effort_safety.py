@@ -14,33 +14,22 @@
 
 """Nothing moves by itself: not after a restart, not from an old, late or foreign command."""
 
+from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros import conversions
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros.world import ask, EVERY_VERDICT, goal, move, stamp, STATUS
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 COMMAND = '/flat_planner/joint_trajectory'
-GOAL = '/flat_planner/goal'
 PLAN = '/flat_planner/plan'
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 DURATION = 9.0
 """Of a motion [s]: long enough to restart a process in the middle of it."""
-
-
-def goal(position: float, duration: float = DURATION) -> JointTrajectory:
-    """Return a goal for joint 1."""
-    point = JointTrajectoryPoint(positions=[position])
-    point.time_from_start = conversions.duration_msg(duration)
-    return JointTrajectory(joint_names=['joint1'], points=[point])
-
-
-def stamp(message) -> float:
-    """Return when a message is stamped [s]."""
-    return conversions.seconds(message.header.stamp)
 
 
 class Watched:
@@ -49,36 +38,37 @@ class Watched:
     def __init__(self, graph, *arguments):
         """Start both and wait for the first joint state."""
         self.graph, self.arguments = graph, arguments
-        self.states = graph.collect(JointState, 'joint_states', 1000, matched=False)
+        self.states = graph.collect(JointState, 'joint_states', matched=False)
         self.planner = graph.create(PlannerNode)
+        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT)
         self.start()
 
     def start(self):
         """Start a plant and wait until it shows itself and hears commands."""
         # One that was killed stays in the graph for a while.
         listeners = self.graph.probe.count_subscribers(COMMAND)
+        now = conversions.seconds(self.graph.probe.get_clock().now().to_msg())
         self.plant = self.graph.start('plant_node', *self.arguments)
-        self.states.clear()
-        self.graph.expect(lambda: self.states, 'joint states of a new plant')
+        self.graph.expect(
+            lambda: self.states and stamp(self.states[-1]) > now, 'joint states of a new plant'
+        )
+        # Some of the former one's may have been on their way.
+        self.states[:] = [state for state in self.states if stamp(state) > now]
         self.graph.expect(
             lambda: self.planner.count_subscribers(COMMAND) > listeners, 'a new listener'
         )
 
     def move(self, position: float, duration: float = DURATION) -> JointTrajectory:
-        """Send a goal until it is accepted: a planner may not have heard of the arm; its plan."""
+        """Send a goal until it is accepted; return its plan."""
         plans = self.graph.collect(JointTrajectory, PLAN)
-        for _ in range(10):
-            self.graph.publish(GOAL, goal(position, duration))
-            if self.graph.spin_until(lambda: plans, 1.0):
-                break
+        move(self.graph, self.status, goal(position, duration))
+        self.graph.expect(lambda: plans, 'the plan')
         return plans[0]
 
     def wait_until(self, time: float):
         """Wait for a joint state stamped then or later."""
         self.graph.expect(
-            lambda: self.states and stamp(self.states[-1]) >= time,
-            f'joint states until {time}',
-            timeout=3 * DURATION,
+            lambda: self.states and stamp(self.states[-1]) >= time, f'joint states until {time}'
         )
 
     def efforts(self) -> np.ndarray:
@@ -100,6 +90,24 @@ def test_a_plant_that_was_killed_in_a_motion_does_not_take_it_up_again(graph):
     assert not watched.efforts().any()
     assert not np.any([state.position for state in watched.states])
     watched.move(0.5, 1.0)  # and the next goal works
+    graph.expect(lambda: watched.states[-1].position[0] > 0.49, 'the next motion')
+
+
+def test_no_motion_takes_over_where_a_restarted_plant_stands_still(graph):
+    watched = Watched(graph)
+    end = stamp(watched.move(2.0)) + DURATION
+    watched.wait_until(end - 0.5 * DURATION)
+    watched.plant.kill()
+    watched.start()
+    new = stamp(watched.states[0])
+    graph.expect(lambda: watched.planner._session.measured.time > new, 'a state of it there')
+    verdict = ask(graph, watched.status, goal(1.0, 1.0))
+    assert watched.planner._session.measured.time < end, 'within the motion'
+    assert verdict['error_name'] == 'START_STATE_MISMATCH', verdict
+    assert float(verdict['limit']) == 0.5
+    watched.wait_until(end + 0.2)
+    assert not watched.efforts().any()
+    watched.move(0.5, 1.0)
     graph.expect(lambda: watched.states[-1].position[0] > 0.49, 'the next motion')
 
 

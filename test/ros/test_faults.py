@@ -64,7 +64,7 @@ class Timed:
     def __init__(self, graph, *classes):
         """Start them."""
         self.graph, self.time = graph, 0.0
-        self.states = graph.collect(JointState, STATES, 1000, matched=False)
+        self.states = graph.collect(JointState, STATES, matched=False)
         self.statuses = graph.collect(DiagnosticArray, STATUS, 100, matched=False)
         self.reports = graph.collect(DiagnosticArray, REPORT, 100, matched=False)
         self.plant, *_ = (graph.create(node_class, SIMULATED) for node_class in classes)
@@ -113,8 +113,9 @@ def test_two_planners_on_one_topic_are_found(graph):
     graph.spin_until(lambda: False, 2.5)
     said = [e for e in graph.log if e.name == 'flat_plant' and text in e.msg]
     times = np.array([e.stamp.sec + 1e-9 * e.stamp.nanosec for e in said])
-    assert len(said) >= 2
-    assert np.diff(times).min() > 0.8
+    assert (
+        2 <= len(said) <= np.ptp(times) + 2.0
+    )  # one a second; a busy node is late, and then in time
 
 
 def test_two_plants_on_one_topic_are_found(graph):

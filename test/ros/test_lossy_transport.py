@@ -99,7 +99,7 @@ class Lossy:
 
     def wait_until(self, time):
         """Wait for a joint state of the plant's time."""
-        self.graph.expect(lambda: stamp(self.states[-1]) >= time, f'{time} s', timeout=30.0)
+        self.graph.expect(lambda: stamp(self.states[-1]) >= time, f'{time} s')
 
     def between(self, start, end):
         """Return times, last joint's angles and first joint's efforts of a time [s]."""
@@ -167,7 +167,7 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
         verdict = lossy.send(pi)
         start = float(verdict['start_time'])
         end = start + float(verdict['duration'])
-        graph.expect(lambda: lossy.reports, 'a report', timeout=30.0)
+        graph.expect(lambda: lossy.reports, 'a report')
         times, _, efforts = lossy.between(start, end + 1.0)
         wanted = played(lossy.relay.received[0], times)
         if not efforts.any():
@@ -231,7 +231,7 @@ def test_residuals_are_reported_honestly_from_joint_states_that_come_badly(graph
         graph.expect(lambda heard=heard: len(lossy.relay.delivered) > heard + 60, 'the reset')
         verdict = lossy.send(position)
         end = float(verdict['start_time']) + float(verdict['duration'])
-        graph.expect(lambda: lossy.reports, 'a report', timeout=30.0)
+        graph.expect(lambda: lossy.reports, 'a report')
         _, angles, _ = lossy.between(end, end + 1.0)
         assert np.abs(angles).max() > 1e-3
         assert_honest(lossy.reports[-1], angles)

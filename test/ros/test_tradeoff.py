@@ -48,7 +48,7 @@ def test_numbers_and_a_picture(tmp_path, capsys):
 def test_parameters_decide(tmp_path):
     wide, narrow = tmp_path / 'wide.csv', tmp_path / 'narrow.csv'
     tradeoff.main([*MOTION, '--csv', str(narrow)])
-    tradeoff.main([*MOTION, '--csv', str(wide), '--set', 'insensitivity.stiffness:=0.2'])
+    tradeoff.main([*MOTION, '--csv', str(wide), '-p', 'insensitivity.stiffness:=0.2'])
     worst = [float(rows(path)[0]['worst']) for path in (narrow, wide)]
     assert worst[1] > 1.5 * worst[0]
 
@@ -57,7 +57,7 @@ def test_parameters_decide(tmp_path):
     ('arguments', 'complaint'),
     [
         (['--params-file', 'none.yaml', *MOTION], 'cannot read none.yaml'),
-        ([*MOTION, '--set', 'insensitivity.stifness:=0.2'], 'did you mean insensitivity.stiff'),
+        ([*MOTION, '-p', 'insensitivity.stifness:=0.2'], 'did you mean insensitivity.stiff'),
         (['--final', '1', '2', '3', '--duration', '1'], '3 angles for an arm of 2 joints'),
         (['--final', '1', '--duration', '-1'], 'duration must be positive'),
         ([*MOTION, '--csv', '/nowhere/numbers.csv'], 'No such file'),

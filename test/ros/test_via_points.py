@@ -97,18 +97,17 @@ def test_a_goal_with_three_via_points(graph, strategy):
     # All that a joint_trajectory_controller asks of a command holds with via points, too.
     assert np.ptp(np.diff(times)) < 2e-9
     start = float(verdict['start_time'])
-    graph.expect(lambda: suite.reports, 'a report', timeout=30.0)
+    graph.expect(lambda: suite.reports, 'a report')
     report = values(suite.reports[0])
     assert float(report['amplitude']) < 1e-5
     # Linear effort every 5 ms: it costs more of the place than of the rest.
     assert float(report['final_error.joint1']) == pytest.approx(0.0, abs=1e-4)
     measured = np.array(
-        [(conversions.seconds(s.header.stamp), sum(s.position)) for s in suite.states]
+        [(conversions.seconds(s.header.stamp) - start, sum(s.position)) for s in suite.states]
     )
-    for time, expected in zip(TIMES, ANGLES, strict=True):
-        row = measured[np.argmin(np.abs(measured[:, 0] - start - time))]
-        # States come every 5 ms of simulated time, and a busy machine loses some.
-        assert row[1] == pytest.approx(expected, abs=0.2)
+    # A busy machine loses some states; those that come are as planned.
+    planned = np.interp(measured[:, 0], times, angle)
+    np.testing.assert_allclose(measured[:, 1], planned, rtol=0.0, atol=1e-3)
 
 
 def test_via_points_without_times(graph):
@@ -123,7 +122,7 @@ def test_via_points_without_times(graph):
     for expected in ANGLES[:-1]:
         assert angle.min() <= expected <= angle.max()
     assert angle.max() > ANGLES[0]
-    graph.expect(lambda: suite.reports, 'a report', timeout=30.0)
+    graph.expect(lambda: suite.reports, 'a report')
     assert float(values(suite.reports[0])['amplitude']) < 1e-5
     assert prescribed_cost > 0.0
 
