@@ -133,8 +133,7 @@ def test_a_busy_machine_leaves_nothing_to_swing_or_the_plant_says_why(graph):
 
 
 def test_a_clock_that_stops_stops_the_motion_and_ends_it_when_it_goes_on(graph):
-    clock = ['--ros-args', '-p', 'use_sim_time:=true']
-    world = World(graph, arguments=clock)
+    world = World(graph, arguments=['-p', 'use_sim_time:=true'])
 
     def show(now):
         """Publish a time until the arm has followed."""

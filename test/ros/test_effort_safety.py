@@ -20,7 +20,7 @@ from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros.world import ask, EVERY_VERDICT, goal, move, stamp, STATUS
+from ros.world import ask, EVERY_VERDICT, goal, move, stamp, START_DELAY, STATUS
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -39,7 +39,7 @@ class Watched:
         """Start both and wait for the first joint state."""
         self.graph, self.arguments = graph, arguments
         self.states = graph.collect(JointState, 'joint_states', matched=False)
-        self.planner = graph.create(PlannerNode)
+        self.planner = graph.create(PlannerNode, {'start_delay': START_DELAY})
         self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT)
         self.start()
 

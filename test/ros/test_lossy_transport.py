@@ -103,6 +103,7 @@ class Lossy:
 
     def between(self, start, end):
         """Return times, last joint's angles and first joint's efforts of a time [s]."""
+        self.wait_until(end)
         chosen = [s for s in self.states if start <= stamp(s) <= end]
         rows = [(stamp(s), s.position[-1], s.effort[0]) for s in chosen]
         return np.array(rows).T

@@ -38,6 +38,26 @@ threading.Timer({delay}, rclpy.try_shutdown).start()
 sys.exit(main())
 """
 
+OVERTAKEN = """
+import sys
+from flat_planner_ros.ros.node_runner import run
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Overtaken(Node):
+    def __init__(self):
+        super().__init__('overtaken')
+        self.topic = self.create_publisher(String, 'topic', 1)
+        self.create_timer(0.01, self.on_tick)
+
+    def on_tick(self):
+        rclpy.shutdown()
+        self.topic.publish(String())
+
+sys.exit(run([Overtaken]))
+"""
+
 
 def start(graph, name, *arguments):
     """Start a program as its console script does, and wait until it catches signals."""
@@ -100,6 +120,12 @@ def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
         graph.spin_until(lambda: process.exit_code is not None, 3.0)
         if process.exit_code is None:
             process.stop()
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('executor', ['events', 'single'])
+def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
+    process = graph.run([sys.executable, '-c', OVERTAKEN], FLAT_PLANNER_EXECUTOR=executor)
     assert_clean(process)
 
 

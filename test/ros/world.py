@@ -30,6 +30,10 @@ NODES = ('planner_node', 'plant_node', 'monitor_node')
 COMMAND, STATUS = '/flat_planner/joint_trajectory', '/flat_planner/status'
 EVERY_VERDICT = QoSProfile(depth=1000, durability=interfaces.LATCHED.durability)
 ANSWERS = ('ACCEPTED', 'REJECTED')
+
+START_DELAY = 0.5
+"""Time between a verdict and the motion [s]; a busy machine may need it to hand over a command."""
+
 NOT_YET = ('START_STATE_UNKNOWN', 'START_STATE_STALE', 'NOT_AT_REST')
 
 
@@ -80,7 +84,9 @@ class World:
 
     def __init__(self, graph, *programs, arguments=(), **environment):
         """Start them, in one process or in several."""
-        self.graph, self.arguments, self.environment = graph, arguments, environment
+        self.graph, self.environment = graph, environment
+        delay = f'flat_planner:start_delay:={START_DELAY}'
+        self.arguments = ['--ros-args', '-p', delay, *arguments]
         self.states = graph.collect(JointState, '/joint_states', matched=False)
         self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT, matched=False)
         self.commands = graph.collect(JointTrajectory, COMMAND, matched=False)
