@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 import sys
+from threading import Thread
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import (
@@ -83,9 +84,14 @@ class MonitorNode(Node):
         self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
 
     def _on_loading(self) -> None:
-        """Load what the first report needs, once, before there is anything to report."""
+        """
+        Load what the first report needs, once, before there is anything to report.
+
+        Beside the executor: on a busy machine it takes longer than a whole motion, which would not
+        be seen.
+        """
         self._loading.cancel()
-        load_libraries()
+        Thread(target=load_libraries).start()
 
     def _now(self) -> float:
         """Return the node's time [s]."""
