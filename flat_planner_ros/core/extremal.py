@@ -184,7 +184,7 @@ class _BoundarySolver:
         self._blocks = [block_of(cluster, parity) for cluster in ordered]
         columns = [column for block in self._blocks for column in block.columns]
         self._rows = _row_factors([b.growth for b in self._blocks for _ in b.columns])
-        self._matrix = self._rows[:, None] * np.array(columns).T
+        self._matrix = (self._rows * np.array(columns)).T
         try:
             self._inverse = np.linalg.inv(self._matrix)
         except np.linalg.LinAlgError as error:

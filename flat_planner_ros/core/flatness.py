@@ -96,7 +96,6 @@ def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.EXACT) -> FlatMap:
     paper.
 
     """
-    arm.check_flat()
     inner, last = arm.inertia_star
     k, relaxation = arm.stiffness, arm.damping / arm.stiffness
     compliance = last / k

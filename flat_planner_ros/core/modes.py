@@ -24,7 +24,7 @@ every time; the others are summed one by one.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from math import comb
 from typing import NamedTuple, TypeVar
 
@@ -80,7 +80,7 @@ class Mode(NamedTuple):
     def mirrored(self, sign: float) -> 'Mode':
         """Return sign times the mode run backwards, x -> -x."""
         signs = (sign, -sign)
-        coefficients = tuple(signs[k % 2] * c for k, c in enumerate(self.coefficients))
+        coefficients = tuple([signs[k % 2] * c for k, c in enumerate(self.coefficients)])
         return Mode(-self.rate, -self.origin, coefficients)
 
     def derivatives(self, order: int) -> ComplexArray:
@@ -133,11 +133,10 @@ class ModeSum:
         # Far from its end an exponential vanishes: this underflow is the right answer.
         with np.errstate(under='ignore'):
             if count:
-                fall = np.multiply.outer(-self.decays, distances)
+                fall = -self.decays[:, None, None] * distances
                 np.exp(fall, out=fall)
                 _split(fall, basis[: 4 * count].reshape(count, 2, 2, places))
-            if len(basis) > 4 * count:
-                _fill_powers(basis[4 * count :], 0.5 * (distances[0] - distances[1]))
+            _fill_powers(basis[4 * count :], 0.5 * (distances[0] - distances[1]))
             result: FloatArray = self.factors[: order + 1] @ basis
             if self.others:
                 self._add_others(result, distances)
@@ -159,23 +158,20 @@ class ModeSum:
         count, half = len(self.decays), intervals // 2 + 1
         size, places, x = even_places(intervals)
         factors = scales[:, None] * self.factors[:orders]
-        amplitudes = factors[:, None, : 4 * count].view(complex).reshape(orders, 1, count, 2)
+        amplitudes = factors[:, None, : 4 * count].view(complex)
         signs, mirrored = _odd_signs(orders), table[:, ::-1]
         with np.errstate(under='ignore'):
             fine, coarse = self._grid_tables(size, places)
             for start in range(0, half, CHUNK):
                 stop = min(start + CHUNK, half)
                 blocks = coarse[start // size : -(-stop // size)]
+                powers = np.empty((factors.shape[1] - 4 * count, stop - start))
+                _fill_powers(powers, x[start:stop])
+                part = factors[:, 4 * count :] @ powers
                 if count:
-                    scaled = np.multiply(amplitudes, blocks, order='C').view(float)
+                    scaled = (amplitudes * blocks).view(float)
                     product = scaled.reshape(orders * len(blocks), 4 * count) @ fine
-                    part = product.reshape(orders, -1)[:, : stop - start]
-                else:
-                    part = np.zeros((orders, stop - start))
-                if factors.shape[1] > 4 * count:
-                    powers = np.empty((factors.shape[1] - 4 * count, stop - start))
-                    _fill_powers(powers, x[start:stop])
-                    part += factors[:, 4 * count :] @ powers
+                    part += product.reshape(orders, -1)[:, : stop - start]
                 if self.others:
                     distances = np.array([1.0 + x[start:stop], 1.0 - x[start:stop]])
                     self._add_others(part, distances, scales)
@@ -190,10 +186,10 @@ class ModeSum:
         -------
         tuple[FloatArray, ComplexArray]
             Re and -Im within a block, shape (4 m, size), and those of the blocks, shape
-            (blocks, m, 2).
+            (blocks, 2 m).
 
         """
-        exponents = np.multiply.outer(-self.decays, places)
+        exponents = -self.decays[:, None] * places
         fall = np.exp(exponents)
         # Else the product of the tables, or a multiple of it, would leave the range of doubles.
         fall[exponents.real < -VANISHING] = 0.0
@@ -201,7 +197,7 @@ class ModeSum:
         _split(fall[:, :size], fine[:, 0])
         fine[:, 1] = fine[:, 0, :, ::-1]
         blocks = (len(places) - size) // 2
-        coarse = fall[:, size:].reshape(len(fall), 2, blocks).transpose(2, 0, 1)
+        coarse = fall[:, size:].reshape(2 * len(fall), blocks).T.copy()
         return fine.reshape(4 * len(fall), size), coarse
 
     def _add_others(
@@ -264,7 +260,7 @@ def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
     index, falling = _falling(terms, order)
     padded = np.zeros((*series.shape[:-1], terms + order), dtype=series.dtype)
     padded[..., :terms] = series
-    derivatives: NDArray[Number] = padded[..., index]
+    derivatives: NDArray[Number] = padded.T[index].T
     derivatives *= falling
     return derivatives
 
@@ -306,10 +302,11 @@ def _trimmed(table: NDArray[Number], reach: float) -> NDArray[Number]:
 
 @cache
 def _falling(terms: int, order: int) -> tuple[NDArray[np.int_], FloatArray]:
-    """Return the sums of power t and derivative k, and their factors (t + k)! / t!."""
-    powers = np.arange(terms)[:, None]
-    steps = np.concatenate([np.ones((terms, 1)), powers + np.arange(1.0, order + 1.0)], axis=1)
-    return powers + np.arange(order + 1), np.multiply.accumulate(steps, axis=1)
+    """Return the sums of derivative k and power t, (k, t), and factors (t + k)! / t!, (t, k)."""
+    index = np.arange(order + 1)[:, None] + np.arange(terms)
+    steps = index.astype(float)
+    steps[0] = 1.0
+    return index, np.multiply.accumulate(steps).T
 
 
 @cache
@@ -322,9 +319,9 @@ def _odd_signs(orders: int) -> FloatArray:
 
 def _fill_powers(table: FloatArray, x: FloatArray) -> None:
     """Write 1, x, x^2, ... into rows."""
-    table[0] = 1.0
-    for k in range(1, len(table)):
-        np.multiply(table[k - 1], x, out=table[k])
+    table[:1] = 1.0
+    for lower, higher in pairwise(table):
+        np.multiply(lower, x, out=higher)
 
 
 def _split(fall: ComplexArray, parts: FloatArray) -> None:

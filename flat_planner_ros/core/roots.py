@@ -23,7 +23,6 @@ do not (docs/derivation.md, section 5).
 
 from cmath import sqrt
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import NamedTuple, TypeVar
 
@@ -57,8 +56,7 @@ CONVERGED = 1e-9
 """Relative step whose square is far below the last digit: the step after it changes nothing."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Cluster:
+class Cluster(NamedTuple):
     """
     Roots that the solver treats together, one representative of +-beta and conjugates.
 

@@ -121,9 +121,9 @@ def _central(factor: bytes, parity: float) -> Block:
 def _exponentials(beta: complex, parity: float) -> Block:
     """Return exp(beta (x - 1)) with its mirror image, real and imaginary part."""
     image = parity * exp(-2.0 * beta) if beta.real < FAR else 0.0
-    values, power = [], 1.0 + 0.0j
+    sums, values, power = (1.0 + image, 1.0 - image), [], 1.0 + 0.0j
     for order in range(CONDITIONS):
-        values.append(power * (1.0 - image if order % 2 else 1.0 + image))
+        values.append(power * sums[order % 2])
         power *= beta
     columns = [[value.real for value in values]]
     if beta.imag == 0.0:

@@ -189,9 +189,8 @@ def _certified(coefficients: FloatArray) -> UnitMotion:
     jet = law.terms.at(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     # Relative to the start, as the value's own peak is the distance.
-    miss = np.abs(jet[:CONDITIONS, [0, -1]] - _ENDS).max(axis=1) / (
-        peaks[:CONDITIONS] + _ENDS[:, 1]
-    )
+    ends, sizes = jet[:CONDITIONS, :: jet.shape[1] - 1], peaks[:CONDITIONS] + _ENDS[:, 1]
+    miss = np.abs(ends - _ENDS) / sizes[:, None]
     return UnitMotion(
         coefficients=coefficients,
         law=law,
