@@ -42,6 +42,9 @@ from trajectory_msgs.msg import JointTrajectory
 TICK_PERIOD = 0.1
 """Time between two looks for silence [s]."""
 
+LATE_TICK = 2.0 * TICK_PERIOD
+"""Time between two such looks beyond which the node has not been listening all the time [s]."""
+
 LOADING_DELAY = 0.1
 """Time from the node's start after which it answers and may load libraries [s]."""
 
@@ -78,7 +81,8 @@ class MonitorNode(Node):
         self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._steady = steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._ticked = steady.now().nanoseconds
         self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
         self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
@@ -158,7 +162,11 @@ class MonitorNode(Node):
             self.get_logger().warning(f"the planner's model is not followed: {error}")
 
     def _on_tick(self) -> None:
-        """Notice silence."""
+        """Notice silence, unless the node itself has been busy: samples may be waiting then."""
+        steady = self._steady.now().nanoseconds
+        elapsed, self._ticked = (steady - self._ticked) / conversions.NANOSECONDS, steady
+        if elapsed > LATE_TICK:
+            return
         now, plan = self._stamps.now(self._now()), self._plan
         # The node's own time would end the watch of a plan that is of another clock.
         is_known = self._stamps.stamp is not None

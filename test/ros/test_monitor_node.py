@@ -17,6 +17,7 @@
 from dataclasses import replace
 from math import cos, exp, hypot, inf, nan, pi, sin, sqrt
 import signal
+from time import sleep
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -466,6 +467,16 @@ def test_a_simulated_clock_that_stands_still_does_not_stop_the_monitor(graph):
     graph.expect(lambda: len(health) >= 2, 'diagnostics')
     assert read(health[-1])[2]['phase'] == 'settling'
     bench.feed(START + DURATION + WINDOW, since=START + DURATION + 1.02)
+    assert bench.report()[0] == DiagnosticStatus.WARN
+
+
+def test_a_monitor_that_has_been_busy_does_not_call_it_silence(graph):
+    bench = Bench(graph, PARAMETERS | {'timeout': 1.0})
+    bench.plan(plan_msg())
+    bench.feed(START + 0.2)
+    graph.spin_until(lambda: False, 0.3)
+    sleep(1.5)  # nothing is served meanwhile, and when it is, the monitor's timer comes first
+    bench.feed(START + DURATION + WINDOW, since=START + 0.22)
     assert bench.report()[0] == DiagnosticStatus.WARN
 
 

@@ -137,7 +137,7 @@ class World:
             return [v for v in found if abs(float(v['start_time']) - self.begin) < 1e-3]
 
         self.graph.expect(mine, 'a report of this motion')
-        return float(mine()[-1]['amplitude'])
+        return float(mine()[-1].get('amplitude', 'nan'))  # not where samples were missing
 
     def efforts(self, since=0.0):
         """Return the efforts of joint 1 from a time [s] on [N m]."""
