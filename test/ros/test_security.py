@@ -15,6 +15,8 @@
 """The security policy allows what the nodes use and nothing else; nothing received is executed."""
 
 import ast
+from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -22,9 +24,11 @@ from flat_planner_ros.ros.monitor_node import MonitorNode
 from flat_planner_ros.ros.planner_node import PlannerNode
 from flat_planner_ros.ros.plant_node import PlantNode
 import pytest
+from rclpy.node import Node
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-POLICY = ElementTree.parse(CHECKOUT / 'config' / 'sros2' / 'policy.xml').getroot()
+POLICY_FILE = CHECKOUT / 'config' / 'sros2' / 'policy.xml'
+POLICY = ElementTree.parse(POLICY_FILE).getroot()
 NODES = {'flat_planner': PlannerNode, 'flat_plant': PlantNode, 'flat_monitor': MonitorNode}
 
 
@@ -49,6 +53,14 @@ def test_the_policy_follows_the_schema():
                 assert {e.tag for e in block} == {block.tag[:-1]}
 
 
+def test_sros2_can_read_the_policy():
+    # It takes whatever stands in <enclaves> for an enclave and fails on a comment.
+    builder = ElementTree.TreeBuilder(insert_comments=True)
+    parser = ElementTree.XMLParser(target=builder)
+    enclaves = ElementTree.parse(POLICY_FILE, parser).getroot().find('enclaves')
+    assert {e.tag for e in enclaves} == {'enclave'}
+
+
 @pytest.mark.parametrize('name', NODES)
 def test_a_node_may_do_what_it_does_and_no_more(graph, name):
     used = {'publish': set(), 'subscribe': set(), 'reply': set()}
@@ -65,6 +77,24 @@ def test_a_node_may_do_what_it_does_and_no_more(graph, name):
     assert used['publish'] == allowed(name, 'topics', 'publish')
     assert used['subscribe'] == allowed(name, 'topics', 'subscribe')
     assert used['reply'] == allowed(name, 'services', 'reply')
+
+
+@pytest.mark.parametrize('enclave', ['operator', 'administrator'])
+def test_those_who_use_the_nodes_may_have_a_node(graph, enclave):
+    def is_allowed(topic, kind, right):
+        return any(fnmatchcase(topic, name) for name in allowed(enclave, kind, right))
+
+    for name in (enclave, '_ros2cli_1234'):  # the ros2 tool's
+        node = graph.create(partial(Node, name))
+        published = {topic for topic, _ in node.get_publisher_names_and_types_by_node(name, '/')}
+        offered = {service for service, _ in node.get_service_names_and_types_by_node(name, '/')}
+        graph.remove(node)
+        assert {'/parameter_events', '/rosout'} <= published
+        assert f'/{name}/get_parameters' in offered
+        assert all(is_allowed(topic, 'topics', 'publish') for topic in published)
+        assert all(is_allowed(service, 'services', 'reply') for service in offered)
+    # In nobody else's name.
+    assert not any(is_allowed(f'/{other}/get_parameters', 'services', 'reply') for other in NODES)
 
 
 def test_only_the_planner_commands_and_only_the_operator_sends_goals():
