@@ -32,7 +32,7 @@ from flat_planner_ros.ros.paper_experiment import (
     refuse_company,
 )
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 SPEED = 5.0
@@ -106,7 +106,9 @@ def main(args: Sequence[str] | None = None) -> int:
             return 1
     speed = 1.0 if options.real_time else SPEED
     try:
-        rclpy.init(args=args)
+        # Left to ROS, a signal would end the context in the middle of a call, which then fails.
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         refuse_company()
         results = _results(speed, BEYOND if options.beyond else CASES)
         print(REMARKS, flush=True)
@@ -119,7 +121,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except (ExperimentFailed, OSError) as error:
         print(f'paper_table: {error}', file=sys.stderr)
         return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except KeyboardInterrupt:
         print('interrupted', file=sys.stderr)
         return 130
     finally:

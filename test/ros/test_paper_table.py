@@ -95,7 +95,8 @@ def test_it_does_not_mix_with_nodes_that_already_run(graph):
     assert 'flat_planner already runs here' in process.stderr
 
 
-def test_an_interrupt_leaves_no_node_behind(graph):
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_leaves_no_node_behind(graph, number):
     process = graph.start('paper_table')
     ours = {'flat_planner', 'flat_plant', 'flat_monitor'}
 
@@ -103,8 +104,7 @@ def test_an_interrupt_leaves_no_node_behind(graph):
         return ours & set(graph.probe.get_node_names())
 
     graph.expect(lambda: present() == ours, 'the three nodes')
-    process.stop(signal.SIGINT)
-    assert process.exit_code == 130
+    assert process.stop(number) == 130
     assert 'Traceback' not in process.stderr
     graph.expect(lambda: not present(), 'the end of the three nodes')
 
