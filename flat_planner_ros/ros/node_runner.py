@@ -121,9 +121,8 @@ def _pardon_shutdown(node: Node) -> None:
     """
 
     def pardoned(callback: Callable) -> Callable:
-        @wraps(
-            callback
-        )  # The signature is looked at: a subscription may ask for more than a message.
+        # Its signature, too: a subscription may ask for more than the message.
+        @wraps(callback)
         def call(*args: Any) -> Any:
             try:
                 return callback(*args)
