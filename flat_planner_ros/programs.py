@@ -15,8 +15,8 @@
 """
 Entry points of the programs: signals count before the libraries are loaded.
 
-Loading them takes most of a second. A SIGINT or SIGTERM ends a program in that time as later on:
-at once, with exit code 0 and without a word.
+Loading them takes most of a second. A SIGINT or SIGTERM ends a node in that time as later on: at
+once, with exit code 0 and without a word. It ends a tool, whose work is not done then, with 130.
 """
 
 from importlib import import_module
@@ -26,6 +26,9 @@ from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """What ends a program."""
+
+INTERRUPTED = 130
+"""Exit code of a tool that was ended before it was done."""
 
 
 def planner_node() -> int:
@@ -58,10 +61,42 @@ def live_view() -> int:
     return _run('live_view')
 
 
-def _run(module: str) -> int:
+def flat_plan() -> int:
+    """Plan on the command line."""
+    return _run_tool('flat_plan')
+
+
+def tradeoff() -> int:
+    """Show effort against residual."""
+    return _run_tool('tradeoff')
+
+
+def make_urdf() -> int:
+    """Write a robot description."""
+    return _run_tool('make_urdf')
+
+
+def analyse() -> int:
+    """Judge a recording."""
+    return _run_tool('analyse')
+
+
+def _run_tool(module: str) -> int:
+    """Run a program that prints and ends; whoever reads it may stop reading, as `head` does."""
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    return _run(module, INTERRUPTED)
+
+
+def _run(module: str, interrupted: int = 0) -> int:
     """Load a module of the ROS layer and run its `main`; return the exit code."""
+
+    def leave(_number: int, _frame: FrameType | None) -> None:
+        # No exception: it would come up in the middle of an import, where some libraries turn it
+        # into another one. There is nothing to be cleaned up yet.
+        os._exit(interrupted)
+
     for number in SIGNALS:
-        signal.signal(number, _leave)
+        signal.signal(number, leave)
     try:
         # From here on, while the nodes exist, the module catches signals by itself.
         return int(import_module(f'flat_planner_ros.ros.{module}').main())
@@ -69,10 +104,3 @@ def _run(module: str) -> int:
         # A late signal must not spoil the exit code while the interpreter is taken down.
         for number in SIGNALS:
             signal.signal(number, signal.SIG_IGN)
-
-
-def _leave(_number: int, _frame: FrameType | None) -> None:
-    """End a process that has nothing to be cleaned up yet, or nothing any more."""
-    # No exception: it would come up in the middle of an import, where some libraries turn it
-    # into another one.
-    os._exit(0)

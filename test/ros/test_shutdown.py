@@ -20,6 +20,7 @@ import signal
 import sys
 from time import monotonic
 
+import numpy as np
 import pytest
 
 CODE = 'import sys; from flat_planner_ros.programs import {0}; sys.exit({0}())'
@@ -127,6 +128,23 @@ def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
 def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
     process = graph.run([sys.executable, '-c', OVERTAKEN], FLAT_PLANNER_EXECUTOR=executor)
     assert_clean(process)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_tool_that_is_interrupted_ends_with_130_and_no_word(graph, number):
+    many = ['--stretch', *map(str, np.linspace(1.0, 3.0, 500))]
+    process = start(graph, 'tradeoff', '--final', '3.14', '--duration', '1', *many)
+    pause(graph, 0.5)
+    assert process.stop(number) == 130
+    assert process.stderr == ''
+
+
+def test_a_tool_whose_reader_goes_away_says_nothing(graph):
+    program = f"{sys.executable} -c '{CODE.format('flat_plan')}' joint1=1 --duration 1 --json - | head -c 10"
+    process = graph.run(['bash', '-c', program])
+    assert process.wait() == 0
+    assert process.stderr == ''
+    assert len(process.stdout) == 10
 
 
 def test_a_program_says_that_it_is_ready_once(graph):
