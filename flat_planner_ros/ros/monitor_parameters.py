@@ -31,7 +31,7 @@ ROWS = [
     Row(
         name='amplitude_ok',
         default=MonitorSettings.amplitude_ok,
-        description='largest amplitude at the end of a motion that is OK [rad]',
+        description='largest amplitude at the end of a motion that is OK, above 0 [rad]',
         lower=0.0,
     ),
     Row(
@@ -43,7 +43,7 @@ ROWS = [
     Row(
         name='settling_band',
         default=MonitorSettings.settling_band,
-        description='deviation of the passive joint that counts as settled [rad]',
+        description='deviation of the passive joint that counts as settled, above 0 [rad]',
         lower=0.0,
     ),
     Row(
