@@ -20,11 +20,10 @@ from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros.world import ask, EVERY_VERDICT, goal, move, stamp, START_DELAY, STATUS
+from ros.world import ask, COMMAND, EVERY_VERDICT, goal, move, Observer, stamp, START_DELAY, STATUS
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-COMMAND = '/flat_planner/joint_trajectory'
 PLAN = '/flat_planner/plan'
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -32,7 +31,7 @@ DURATION = 9.0
 """Of a motion [s]: long enough to restart a process in the middle of it."""
 
 
-class Watched:
+class Watched(Observer):
     """A planner in the test and a plant in a process of its own, both watched."""
 
     def __init__(self, graph, *arguments):
@@ -64,12 +63,6 @@ class Watched:
         move(self.graph, self.status, goal(position, duration))
         self.graph.expect(lambda: plans, 'the plan')
         return plans[0]
-
-    def wait_until(self, time: float):
-        """Wait for a joint state stamped then or later."""
-        self.graph.expect(
-            lambda: self.states and stamp(self.states[-1]) >= time, f'joint states until {time}'
-        )
 
     def efforts(self) -> np.ndarray:
         """Return the efforts of joint 1 since the last restart [N m]."""

@@ -24,21 +24,14 @@ from flat_planner_ros.ros.plant_node import PlantNode
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
+from ros.world import ask, COMMAND, goal, REPORT, stamp, STATUS, values
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
-STATES, COMMAND, GOAL = '/joint_states', '/flat_planner/joint_trajectory', '/flat_planner/goal'
-REPORT, STATUS = '/flat_monitor/report', '/flat_planner/status'
+STATES, GOAL = '/joint_states', '/flat_planner/goal'
 SIMULATED = {'use_sim_time': True}
-
-
-def goal(position=1.0, duration=1.0):
-    """Return a goal for joint 1."""
-    point = JointTrajectoryPoint(positions=[position])
-    point.time_from_start = conversions.duration_msg(duration)
-    return JointTrajectory(joint_names=['joint1'], points=[point])
 
 
 def state(time, position=(0.0, 0.0), velocity=(0.0, 0.0), names=('joint1', 'joint2')):
@@ -51,11 +44,6 @@ def state(time, position=(0.0, 0.0), velocity=(0.0, 0.0), names=('joint1', 'join
 def errors(graph, text):
     """Return the nodes that have logged an error with a text."""
     return {e.name for e in graph.log if e.level >= Log.ERROR and text in e.msg}
-
-
-def values(msg):
-    """Return the values of a message's only status."""
-    return {pair.key: pair.value for pair in msg.status[0].values}
 
 
 class Timed:
@@ -83,19 +71,11 @@ class Timed:
 
     def seen(self):
         """Return the stamp of the newest joint state [s]."""
-        return conversions.seconds(self.states[-1].header.stamp)
+        return stamp(self.states[-1])
 
     def move(self, position):
         """Send a goal; return its verdict."""
-        verdicts = [m for m in self.statuses if values(m).get('state') in ('ACCEPTED', 'REJECTED')]
-        self.graph.publish(GOAL, goal(position))
-
-        def answers():
-            states = ('ACCEPTED', 'REJECTED')
-            return [m for m in self.statuses if values(m).get('state') in states]
-
-        self.graph.expect(lambda: len(answers()) > len(verdicts), 'a verdict')
-        verdict = values(answers()[-1])
+        verdict = ask(self.graph, self.statuses, goal(position))
         if verdict['state'] == 'ACCEPTED':
             start = float(verdict['start_time'])
             self.graph.expect(
@@ -160,7 +140,7 @@ def test_no_motion_starts_from_broken_joint_states(graph, name):
     commands = graph.collect(JointTrajectory, COMMAND)
     BROKEN[name].header.stamp = graph.probe.get_clock().now().to_msg()
     graph.publish(STATES, BROKEN[name])
-    graph.publish(GOAL, goal())
+    graph.publish(GOAL, goal(1.0))
     graph.expect(lambda: statuses, 'a verdict')
     assert values(statuses[0])['state'] == 'REJECTED'
     assert not commands
@@ -174,7 +154,7 @@ def test_a_late_joint_state_does_not_take_the_place_of_a_newer_one(graph):
     graph.publish(STATES, state(now - 0.1, (-0.5, 0.0)))
     for _ in range(3):  # until both have been worked off
         graph.get_parameters('flat_planner', 'strategy')
-    graph.publish(GOAL, goal())
+    graph.publish(GOAL, goal(1.0))
     graph.expect(lambda: plans, 'a plan')
     assert plans[0].points[0].positions[0] == 0.5
     assert planner.context.ok()

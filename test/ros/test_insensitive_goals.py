@@ -18,11 +18,12 @@ from math import pi
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm, rollout
-from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros import interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from ros.world import ask, goal, STATUS
+from trajectory_msgs.msg import JointTrajectory
 
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3.0e-3, damping=2.0e-5)
 REST = {'start.source': 'parameter', 'start.position': [0.0, 0.0], 'execute': False}
@@ -35,23 +36,16 @@ class Planner:
         """Start it."""
         self.graph = graph
         graph.create(PlannerNode, {**REST, **parameters})
-        self.status = graph.collect(
-            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
-        )
+        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
         self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
 
     def send(self, angle=pi, duration=1.0):
         """Send a goal for joint 1 and return the values of its verdict."""
-        point = JointTrajectoryPoint(
-            positions=[angle], time_from_start=conversions.duration_msg(duration)
-        )
         before = len(self.status)
-        message = JointTrajectory(joint_names=['joint1'], points=[point])
-        self.graph.publish('/flat_planner/goal', message)
-        self.graph.expect(lambda: len(self.status) > before, 'a verdict')
+        verdict = ask(self.graph, self.status, goal(angle, duration))
         status = self.status[before].status[0]
         self.level = status.level
-        return {**{pair.key: pair.value for pair in status.values}, 'message': status.message}
+        return {**verdict, 'message': status.message}
 
     def command(self):
         """Return the points of the last plan."""

@@ -21,9 +21,10 @@ from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
+from ros.world import goal, STATUS, values
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 EFFORT, VELOCITY = 0.015, 7.0
 """Limits of joint 1 [N m, rad/s]."""
@@ -47,9 +48,7 @@ class Planner:
         """Start it and let it see the arm."""
         self.graph = graph
         self.node = graph.create(PlannerNode, {**LIMITED, **parameters})
-        self.status = graph.collect(
-            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
-        )
+        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
         self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
         state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
         state.header.stamp = self.node.get_clock().now().to_msg()
@@ -58,18 +57,14 @@ class Planner:
 
     def send(self, angle=pi, duration=0.0):
         """Send a goal and return the verdict and its values."""
-        point = JointTrajectoryPoint(
-            positions=[angle], time_from_start=conversions.duration_msg(duration)
-        )
-        return self.verdict('goal', JointTrajectory(joint_names=['joint1'], points=[point]))
+        return self.verdict('goal', goal(angle, duration))
 
     def verdict(self, topic, message):
         """Return the answer to a message."""
         before = len(self.status)
         self.graph.publish(f'/flat_planner/{topic}', message)
         self.graph.expect(lambda: len(self.status) > before, 'a verdict')
-        status = self.status[before].status[0]
-        return status, {pair.key: pair.value for pair in status.values}
+        return self.status[before].status[0], values(self.status[before])
 
     def exact_plan(self):
         """Return the continuous plan that was accepted last, sampled 100 001 times."""

@@ -22,10 +22,10 @@ from flat_planner_ros.ros import conversions, interfaces
 import numpy as np
 import pytest
 from ros.relay import Faults, Relay
-from ros.world import stamp, values
+from ros.world import answers, EVERY_VERDICT, goal, move, Observer, stamp, STATUS, values
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 GOAL, COMMAND, STATES = '/flat_planner/goal', '/flat_planner/joint_trajectory', '/joint_states'
 BAD = Faults(loss=0.2, duplication=0.3, reordering=0.3, delay=(0.0, 0.2))
@@ -36,14 +36,7 @@ REFUSED, LATE = 'trajectory ignored', 'ms after its start'
 SAMPLES = interfaces.QoSProfile(depth=1000)
 
 
-def goal(position, duration=0.8):
-    """Return a goal for joint 1."""
-    point = JointTrajectoryPoint(positions=[float(position)])
-    point.time_from_start = conversions.duration_msg(duration)
-    return JointTrajectory(joint_names=['joint1'], points=[point])
-
-
-class Lossy:
+class Lossy(Observer):
     """The three nodes, what the plant hears or says through a relay."""
 
     def __init__(self, graph, *, source, target, kind, remap='', seed=1, **plant):
@@ -70,8 +63,7 @@ class Lossy:
                 kind, source, target, seed=seed, context=graph.context, use_global_arguments=False
             )
         )
-        status = interfaces.QoSProfile(depth=1000, durability=interfaces.LATCHED.durability)
-        self.status = graph.collect(DiagnosticArray, '/flat_planner/status', status)
+        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT)
         self.reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
         truth = '/true_states' if kind is JointState else STATES
         self.states = graph.collect(JointState, truth, SAMPLES)
@@ -80,26 +72,9 @@ class Lossy:
             graph.expect(self.relay.source.get_publisher_count, 'a source of the relay')
         graph.expect(lambda: self.states, 'joint states')
 
-    def verdicts(self):
-        """Return the values of the verdicts on goals."""
-        answers = map(values, self.status)
-        return [v for v in answers if v['state'] in ('ACCEPTED', 'REJECTED')]
-
     def send(self, position, duration=0.8):
         """Send a goal until it is accepted: joint states may be too old; return its verdict."""
-        for _ in range(20):
-            count = len(self.verdicts())
-            self.graph.publish(GOAL, goal(position, duration))
-            self.graph.expect(lambda count=count: len(self.verdicts()) > count, 'a verdict')
-            verdict = self.verdicts()[-1]
-            if verdict['state'] == 'ACCEPTED':
-                return verdict
-            assert verdict['error_name'] in ('START_STATE_STALE', 'NOT_AT_REST')
-        pytest.fail(f'no goal is accepted: {verdict}')
-
-    def wait_until(self, time):
-        """Wait for a joint state of the plant's time."""
-        self.graph.expect(lambda: stamp(self.states[-1]) >= time, f'{time} s')
+        return move(self.graph, self.status, goal(position, duration))
 
     def between(self, start, end):
         """Return times, last joint's angles and first joint's efforts of a time [s]."""
@@ -127,7 +102,7 @@ def test_every_goal_that_arrives_gets_one_verdict_in_the_order_of_arrival(graph)
     lossy = Lossy(graph, source='/goals', target=GOAL, kind=JointTrajectory)
     lossy.relay.faults = BAD
     for number in range(80):
-        asked = goal(0.01 * number)
+        asked = goal(0.01 * number, 0.8)
         if number % 5 == 0:
             asked.points[0].velocities = [1.0]
         graph.publish('/goals', asked)
@@ -140,11 +115,11 @@ def test_every_goal_that_arrives_gets_one_verdict_in_the_order_of_arrival(graph)
     assert len(set(arrived)) < len(arrived), 'some came twice'
     assert set(arrived) < set(sent), 'some were lost'
     assert arrived != sorted(arrived), 'some came out of order'
-    graph.expect(lambda: len(lossy.verdicts()) >= len(arrived), 'all verdicts')
+    graph.expect(lambda: len(answers(lossy.status)) >= len(arrived), 'all verdicts')
     graph.spin_until(lambda: False, 0.3)  # no verdict too many
-    answered = [json.loads(v['goal.positions'])[0] for v in lossy.verdicts()]
+    answered = [json.loads(v['goal.positions'])[0] for v in answers(lossy.status)]
     assert answered == pytest.approx(arrived)
-    for message, verdict in zip(relay.delivered, lossy.verdicts(), strict=True):
+    for message, verdict in zip(relay.delivered, answers(lossy.status), strict=True):
         assert (verdict['state'] == 'REJECTED') >= bool(message.points[0].velocities)
 
 

@@ -16,65 +16,10 @@
 
 from math import pi
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros import conversions, interfaces
-from flat_planner_ros.ros.monitor_node import MonitorNode
-from flat_planner_ros.ros.planner_node import PlannerNode
-from flat_planner_ros.ros.plant_node import PlantNode
 import pytest
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
+from ros.world import Suite, values
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-SPEED = 3.0
-"""Simulated seconds per second: what one process of three nodes keeps up with on a busy core."""
-
-
-class Suite:
-    """The three nodes on one graph, the plant owning the time."""
-
-    def __init__(self, graph, planner=None, plant=None, monitor=None):
-        """Start them and wait until they have found each other."""
-        self.graph = graph
-        simulated = {'use_sim_time': True}
-        clock = {'publish_clock': True, 'real_time_factor': SPEED}
-        slow = {'reference_rate': 10.0, 'start_delay': 0.5}
-        self.planner = graph.create(PlannerNode, {**simulated, **slow, **(planner or {})})
-        self.monitor = graph.create(MonitorNode, {**simulated, 'window': 2.0, **(monitor or {})})
-        self.plant = graph.create(PlantNode, {**clock, **(plant or {})})
-        self.status = graph.collect(
-            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
-        )
-        self.reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
-        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
-        self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
-        self.clock = graph.collect(Clock, '/clock')
-        graph.expect(
-            lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
-            'the three nodes on joint_states',
-        )
-
-    def move(self, angle: float, duration: float = 1.0) -> tuple[dict[str, str], dict[str, str]]:
-        """Send a goal; return the values of its verdict and of the report on its motion."""
-        verdicts, reports = len(self.status), len(self.reports)
-        goal = JointTrajectory(joint_names=['joint1'])
-        goal.points = [
-            JointTrajectoryPoint(
-                positions=[angle], time_from_start=conversions.duration_msg(duration)
-            )
-        ]
-        self.graph.publish('/flat_planner/goal', goal)
-        self.graph.expect(lambda: len(self.status) > verdicts, 'a verdict')
-        verdict = values(self.status[verdicts])
-        assert verdict['state'] == 'ACCEPTED', self.status[verdicts].status[0].message
-        self.graph.expect(lambda: len(self.reports) > reports, 'a report')
-        return verdict, values(self.reports[-1])
-
-
-def values(message: DiagnosticArray) -> dict[str, str]:
-    """Return the values of the first status."""
-    return {pair.key: pair.value for pair in message.status[0].values}
+from trajectory_msgs.msg import JointTrajectory
 
 
 @pytest.mark.parametrize(
@@ -134,12 +79,7 @@ def test_two_motions_give_two_reports_and_each_starts_where_the_last_ended(graph
 
 def test_a_rejected_goal_disturbs_no_motion(graph):
     suite = Suite(graph, planner={'flat_model': 'approximate'})
-    goal = JointTrajectory(joint_names=['joint1'])
-    goal.points = [
-        JointTrajectoryPoint(positions=[pi], time_from_start=conversions.duration_msg(1.0))
-    ]
-    graph.publish('/flat_planner/goal', goal)
-    graph.expect(lambda: suite.status, 'a verdict')
+    suite.send(pi)
     graph.expect(lambda: abs(suite.states[-1].effort[0]) > 0.0, 'the motion')
     graph.publish('/flat_planner/goal', JointTrajectory())
     graph.expect(lambda: suite.reports, 'a report')

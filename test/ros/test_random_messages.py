@@ -39,6 +39,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
+from ros.world import answers, goal
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -82,7 +83,7 @@ def some(count: int):
 
 
 @st.composite
-def stamps(draw, now: float | None = None):
+def stamps(draw):
     """Return a stamp, mostly the one for as soon as possible."""
     kind = draw(st.integers(0, 3))
     if kind == 0:
@@ -199,20 +200,14 @@ class Goals:
         data = serialize_message(message)  # takes seconds for an enormous one
         begin = perf_counter()
         self.publisher.publish(data)
-        self.graph.expect(self._answers, 'a verdict')
+        self.graph.expect(lambda: answers(self.status), 'a verdict')
         elapsed = perf_counter() - begin
-        answers = self._answers()
-        assert len(answers) == 1
-        if answers[0]['state'] == 'REJECTED':
+        (verdict,) = answers(self.status)
+        if verdict['state'] == 'REJECTED':
             self.slowest = max(self.slowest, elapsed)
-        self.states[answers[0]['state']] += 1
+        self.states[verdict['state']] += 1
         self.graph.log.clear()
-        return answers[0]
-
-    def _answers(self) -> list[dict[str, str]]:
-        """Return the verdicts on goals that have come since."""
-        found = [{pair.key: pair.value for pair in m.status[0].values} for m in self.status]
-        return [values for values in found if values['state'] in ('ACCEPTED', 'REJECTED')]
+        return verdict
 
 
 def test_every_random_goal_gets_one_verdict(graph):
@@ -256,8 +251,8 @@ def test_goals_leave_no_memory_behind(graph):
     def send(count):
         for _ in range(count):
             # Straight to the node: what collects messages here would grow itself.
-            goals.planner._on_goal(serialize_message(_goal(random.uniform(0.5, 3.0))))
-            goals.planner._on_goal(serialize_message(_goal(-1.0)))
+            goals.planner._on_goal(serialize_message(goal(1.0, random.uniform(0.5, 3.0))))
+            goals.planner._on_goal(serialize_message(goal(1.0, -1.0)))
             goals.planner._report_ended()
 
     send(300)
@@ -269,7 +264,7 @@ def test_goals_leave_no_memory_behind(graph):
 def test_random_joint_states_harm_no_node(graph):
     goals = Goals(graph)
     monitor = graph.create(MonitorNode)
-    assert goals.send(_goal(60.0))['state'] == 'ACCEPTED'
+    assert goals.send(goal(1.0, 60.0))['state'] == 'ACCEPTED'
     track = goals.planner._session.track(0.0)
 
     @random_messages(200)
@@ -337,18 +332,10 @@ def test_random_parameters_are_refused_or_consistent(graph, node_class, rows):
     change()
 
 
-def _goal(duration: float) -> JointTrajectory:
-    """Return a plain goal."""
-    point = JointTrajectoryPoint(
-        positions=[1.0], time_from_start=conversions.duration_msg(duration)
-    )
-    return JointTrajectory(joint_names=['joint1'], points=[point])
-
-
 def _still_serves(graph, goals: Goals, monitor) -> None:
     """Check that planner and monitor answer as before."""
     state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
     state.header.stamp = conversions.time_msg(now_of(goals.planner))
     graph.publish('/joint_states', state, readers=2)
-    assert goals.send(_goal(1.0))['state'] == 'ACCEPTED'
+    assert goals.send(goal(1.0, 1.0))['state'] == 'ACCEPTED'
     graph.expect(lambda: monitor.get_name() == 'flat_monitor', 'the monitor')

@@ -32,6 +32,7 @@ import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from ros.world import goal, values
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -69,17 +70,6 @@ START, MOTION, PERIOD = 1000.0, 0.5, 0.01
 
 SWING, DECAY, RATE = 0.02, 0.32, 9.785
 """Amplitude [rad], decay [1/s] and angular frequency [rad/s] of the passive joint after it."""
-
-
-def goal(angle: float) -> JointTrajectory:
-    """Return a goal for joint 1 within 0.5 s."""
-    point = JointTrajectoryPoint(positions=[angle], time_from_start=conversions.duration_msg(0.5))
-    return JointTrajectory(joint_names=['joint1'], points=[point])
-
-
-def values(message: DiagnosticArray) -> dict[str, str]:
-    """Return the values of the first status."""
-    return {pair.key: pair.value for pair in message.status[0].values}
 
 
 def plan() -> JointTrajectory:
@@ -159,7 +149,7 @@ def test_three_nodes_are_recorded_and_judged_again(graph, tmp_path, capsys):
     path = tmp_path / 'motion.mcap'
     reports = moved(graph)
     recorder = record_motion(graph, path)
-    graph.publish('/flat_planner/goal', goal(1.0), readers=2)
+    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
     graph.expect(lambda: reports, 'a report')
     graph.expect(lambda: set(Recording(path).topics) >= OURS, 'all topics')
     graph.remove(recorder)
@@ -231,7 +221,7 @@ def test_a_recording_is_what_the_specification_of_mcap_asks_for(graph, tmp_path)
     recorder = record(graph, path)
     publish_states(graph, 20)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    graph.publish('/flat_planner/plan', goal(1.0), latched)
+    graph.publish('/flat_planner/plan', goal(1.0, 0.5), latched)
     graph.expect(lambda: ': 21 messages on 2 topics' in recorder.summary, 'all messages')
     graph.remove(recorder)
     with path.open('rb') as file:
@@ -282,7 +272,7 @@ def test_a_publisher_that_comes_to_offer_less_is_heard(graph, tmp_path):
 def test_a_namespace_is_followed(graph, tmp_path):
     path = tmp_path / 'left.mcap'
     recorder = graph.create(partial(RecorderNode, path), None, '-r', '__ns:=/left')
-    graph.publish('/left/flat_planner/goal', goal(1.0))
+    graph.publish('/left/flat_planner/goal', goal(1.0, 0.5))
     graph.publish('/left/joint_states', JointState(name=['joint1']))
     graph.expect(lambda: ': 2 messages on 2 topics' in recorder.summary, 'both messages')
     graph.remove(recorder)
@@ -409,7 +399,7 @@ def test_a_bag_of_another_storage_with_other_names_is_analysed(graph, tmp_path, 
     path = tmp_path / 'motion.mcap'
     reports = moved(graph)
     recorder = record_motion(graph, path)
-    graph.publish('/flat_planner/goal', goal(1.0), readers=2)
+    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
     graph.expect(lambda: reports, 'a report')
     graph.remove(recorder)
     names = {'/flat_planner/plan': '/robot/command', '/joint_states': '/robot/measured'}
@@ -438,7 +428,7 @@ def test_a_motion_is_drawn(graph, tmp_path):
     path, picture = tmp_path / 'motion.mcap', tmp_path / 'motion.png'
     reports = moved(graph)
     recorder = record_motion(graph, path)
-    graph.publish('/flat_planner/goal', goal(1.0), readers=2)
+    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
     graph.expect(lambda: reports, 'a report')
     graph.remove(recorder)
     assert analyse.main(['analyse', str(path), '--plot', str(picture)]) == 0

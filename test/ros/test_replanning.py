@@ -16,17 +16,13 @@
 
 from math import pi
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros import conversions, interfaces
-from flat_planner_ros.ros.monitor_node import MonitorNode
-from flat_planner_ros.ros.planner_node import PlannerNode
-from flat_planner_ros.ros.plant_node import PlantNode
+from flat_planner_ros.ros import conversions
 import numpy as np
 import pytest
-from sensor_msgs.msg import JointState
+from ros.world import stamp, Suite, values
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 SPEED = 0.5
 """
@@ -39,60 +35,18 @@ LOOKAHEAD = 0.25
 """Time between a goal in motion and its start [s], half a second of real time."""
 
 
-class Arm:
-    """The three nodes on one graph, the plant owning the time."""
+class Arm(Suite):
+    """The three nodes, the planner quick to re-plan."""
 
     def __init__(self, graph, planner=None, plant=None):
-        """Start them and wait until they have found each other."""
-        self.graph = graph
-        simulated = {'use_sim_time': True}
-        slow = {'reference_rate': 20.0, 'start_delay': 0.2, 'replan.lookahead': LOOKAHEAD}
-        clock = {'publish_clock': True, 'real_time_factor': SPEED}
-        self.planner = graph.create(PlannerNode, {**simulated, **slow, **(planner or {})})
-        self.monitor = graph.create(MonitorNode, {**simulated, 'window': 1.0})
-        self.plant = graph.create(PlantNode, {**clock, **(plant or {})})
-        self.status = graph.collect(
-            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
-        )
-        self.reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
-        self.commands = graph.collect(JointTrajectory, '/flat_planner/joint_trajectory')
-        self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
-        graph.expect(
-            lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
-            'the three nodes on joint_states',
-        )
+        """Start them."""
+        quick = {'reference_rate': 20.0, 'start_delay': 0.2, 'replan.lookahead': LOOKAHEAD}
+        super().__init__(graph, {**quick, **(planner or {})}, plant, speed=SPEED, window=1.0)
 
-    def now(self) -> float:
-        """Return the time of the last joint state [s]."""
-        return conversions.seconds(self.states[-1].header.stamp)
-
-    def wait_until(self, time: float) -> None:
-        """Wait for a time of the plant's clock."""
-        self.graph.expect(lambda: self.now() >= time, f'{time} s')
-
-    def send(self, angle: float, duration: float = 1.0) -> dict[str, str]:
-        """Send a goal and return its verdict."""
-        before = len(self.verdicts('ACCEPTED', 'REJECTED'))
-        point = JointTrajectoryPoint(
-            positions=[float(angle)], time_from_start=conversions.duration_msg(duration)
-        )
-        goal = JointTrajectory(joint_names=['joint1'], points=[point])
-        self.graph.publish('/flat_planner/goal', goal)
-        self.graph.expect(lambda: len(self.verdicts('ACCEPTED', 'REJECTED')) > before, 'a verdict')
-        return self.verdicts('ACCEPTED', 'REJECTED')[before]
-
-    def verdicts(self, *states: str) -> list[dict[str, str]]:
-        """Return the values of all verdicts with one of these states."""
-        found = [
-            {pair.key: pair.value for pair in message.status[0].values} for message in self.status
-        ]
-        return [values for values in found if values['state'] in states]
-
-    def residual(self) -> float:
+    def residual(self):
         """Return the amplitude that the last motion has left, from the monitor [rad]."""
         self.graph.expect(lambda: self.reports, 'a report')
-        report = {pair.key: pair.value for pair in self.reports[-1].status[0].values}
-        return float(report['amplitude'])
+        return float(values(self.reports[-1])['amplitude'])
 
 
 @pytest.mark.timeout(240)
@@ -107,7 +61,7 @@ def test_ten_goals_at_random_moments_of_motion_leave_no_more_than_one(graph):
     arm.wait_until(float(verdict['start_time']) + float(verdict['duration']) + 0.1)
     graph.expect(lambda: arm.verdicts('FINISHED'), 'the end')
     assert len(arm.verdicts('PREEMPTED')) == 10
-    ids = [values['plan_id'] for values in arm.verdicts('PREEMPTED')]
+    ids = [verdict['plan_id'] for verdict in arm.verdicts('PREEMPTED')]
     assert ids == [str(number) for number in range(1, 11)]
     assert arm.verdicts('FINISHED')[0]['plan_id'] == '11'
     assert arm.residual() < 1e-5
@@ -182,6 +136,5 @@ def test_a_stream_of_efforts_moves_the_arm_as_well_as_its_jitter_allows(graph):
 
 def points(command: JointTrajectory):
     """Yield absolute times [s] and points."""
-    start = conversions.seconds(command.header.stamp)
     for point in command.points:
-        yield start + conversions.seconds(point.time_from_start), point
+        yield stamp(command) + conversions.seconds(point.time_from_start), point

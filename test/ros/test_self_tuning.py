@@ -17,18 +17,12 @@
 from math import pi
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flat_planner_ros.ros import conversions, interfaces
-from flat_planner_ros.ros.monitor_node import MonitorNode
+from flat_planner_ros.ros import interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
-from flat_planner_ros.ros.plant_node import PlantNode
 import pytest
 from rcl_interfaces.msg import SetParametersResult
-from sensor_msgs.msg import JointState
+from ros.world import ask, goal, REPORT, STATUS, Suite, values
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-SPEED = 3.0
-"""Simulated seconds per second: what one process of three nodes keeps up with on a busy core."""
 
 STIFFNESS, DAMPING, INERTIA = 3e-3, 2e-5, (6.4e-4, 3.3e-5)
 """Nominal model: spring [N m/rad], damper [N m s/rad] and inertias [kg m^2] of the paper's arm."""
@@ -42,51 +36,29 @@ JOINT_INERTIA = {
 QUEUE = 10
 """Joint states after which every node has read the first of them: twice the nodes' queue [-]."""
 
-ADOPT, REPORT, STATUS = (
-    '/flat_planner/adopt_estimate',
-    '/flat_monitor/report',
-    '/flat_planner/status',
-)
+ADOPT = '/flat_planner/adopt_estimate'
 
 
-class Suite:
-    """The three nodes on one graph, the plant owning the time and differing from the model."""
+class Tuned(Suite):
+    """The three nodes, the plant differing from the model."""
 
     def __init__(self, graph, scale, planner=None, **plant):
-        """Start them and wait until they have found each other."""
-        self.graph = graph
-        simulated = {'use_sim_time': True}
-        slow = {'reference_rate': 10.0, 'start_delay': 0.4, 'strategy': 'polynomial'}
-        graph.create(PlannerNode, {**simulated, **slow, **(planner or {})})
-        graph.create(MonitorNode, {**simulated, 'window': 2.0})
+        """Start them."""
+        slow = {'start_delay': 0.4, 'strategy': 'polynomial'}
         mismatch = {f'mismatch.{name}_scale': scale for name in ('stiffness', 'damping')}
-        clock = {'publish_clock': True, 'real_time_factor': SPEED}
-        graph.create(PlantNode, {**clock, **mismatch, **plant})
-        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
-        self.reports = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED)
-        self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
-        graph.expect(
-            lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
-            'the three nodes on joint_states',
-        )
+        super().__init__(graph, {**slow, **(planner or {})}, {**mismatch, **plant})
 
-    def move(self, angle=pi):
+    def report(self, angle=pi):
         """Move from the initial pose; return the values of the report."""
-        count = len(self.reports)
         self.graph.call(Trigger, '/flat_plant/reset')
         self.graph.expect(lambda: not any(self.states[-1].velocity), 'the reset')
         seen = len(self.states)
         self.graph.expect(lambda: len(self.states) >= seen + QUEUE, 'the reset at the planner')
-        goal = JointTrajectory(joint_names=['joint1'])
-        goal.points = [
-            JointTrajectoryPoint(positions=[angle], time_from_start=conversions.duration_msg(1.0))
-        ]
-        self.graph.publish('/flat_planner/goal', goal)
-        self.graph.expect(lambda: len(self.reports) > count, 'a report')
-        assert self.verdicts()[-2:] == ['ACCEPTED', 'FINISHED']
-        return values(self.reports[-1])
+        _, report = self.move(angle)
+        assert self.outcomes()[-2:] == ['ACCEPTED', 'FINISHED']
+        return report
 
-    def verdicts(self):
+    def outcomes(self):
         """Return the states of all goals so far."""
         return [values(m)['state'] for m in self.status if m.status[0].name.endswith(': goal')]
 
@@ -97,11 +69,6 @@ class Suite:
     def model(self):
         """Return stiffness and damping as the planner's parameters say."""
         return self.graph.get_parameters('flat_planner', 'model.stiffness', 'model.damping')
-
-
-def values(message):
-    """Return the values of the first status."""
-    return {pair.key: pair.value for pair in message.status[0].values}
 
 
 def report_msg(start=5.0, factor=1.1, basis='free', **changes):
@@ -148,19 +115,19 @@ class Bench:
 
 @pytest.mark.parametrize('scale', [1.1, 0.9, 1.25, 0.75])
 def test_the_second_move_leaves_a_fiftieth_of_the_first(graph, scale):
-    suite = Suite(graph, scale)
-    first = suite.move()
+    suite = Tuned(graph, scale)
+    first = suite.report()
     amplitude = float(first['amplitude'])
     assert amplitude > 0.03
     assert float(first['stiffness_estimate']) == pytest.approx(scale * STIFFNESS, rel=1e-3)
     assert float(first['damping_estimate']) == pytest.approx(scale * DAMPING, rel=0.03)
     assert first['estimate_basis'] == 'free'
-    again = suite.move()
+    again = suite.report()
     assert float(again['amplitude']) == pytest.approx(amplitude, rel=1e-3)
     response = graph.call(Trigger, ADOPT)
     assert response.success, response.message
     assert suite.model() == [float(again[f'{name}_estimate']) for name in ('stiffness', 'damping')]
-    second = suite.move()
+    second = suite.report()
     assert float(second['amplitude']) <= 0.02 * amplitude
     (notice,) = suite.adoptions()
     assert notice.level == DiagnosticStatus.OK
@@ -169,19 +136,19 @@ def test_the_second_move_leaves_a_fiftieth_of_the_first(graph, scale):
     assert noted['state'] == 'ADOPTED'
     assert float(noted['stiffness_former']) == STIFFNESS
     assert noted['stiffness'] == again['stiffness_estimate']
-    assert suite.verdicts() == 3 * ['ACCEPTED', 'FINISHED']
+    assert suite.outcomes() == 3 * ['ACCEPTED', 'FINISHED']
 
 
 @pytest.mark.parametrize('scale', [1.1, 0.75])
 def test_with_noise_and_without_being_asked(graph, scale):
     tuned = {'auto_tune': True}
-    suite = Suite(graph, scale, planner=tuned, **{'noise.position_std': 1e-4, 'noise.seed': 1})
-    first = suite.move()
+    suite = Tuned(graph, scale, planner=tuned, **{'noise.position_std': 1e-4, 'noise.seed': 1})
+    first = suite.report()
     error = float(first['stiffness_estimate']) - scale * STIFFNESS
     assert abs(error) < 4 * float(first['stiffness_std'])
     graph.expect(suite.adoptions, 'the adoption')
     assert suite.model()[0] == float(first['stiffness_estimate'])
-    second = suite.move()
+    second = suite.report()
     assert float(second['amplitude']) <= 0.05 * float(first['amplitude'])
     # What is left is noise, or at most so little that the estimate confirms the model.
     assert len(suite.adoptions()) == 1
@@ -189,8 +156,8 @@ def test_with_noise_and_without_being_asked(graph, scale):
 
 
 def test_below_the_noise_the_estimate_is_withheld(graph):
-    suite = Suite(graph, 1.0, planner={'auto_tune': True}, **{'noise.position_std': 1e-4})
-    report = suite.move()
+    suite = Tuned(graph, 1.0, planner={'auto_tune': True}, **{'noise.position_std': 1e-4})
+    report = suite.report()
     assert not [key for key in report if 'estimate' in key or key.endswith('_std')]
     message = suite.reports[-1].status[0].message
     assert 'no oscillation above noise' in message
@@ -204,8 +171,8 @@ def test_below_the_noise_the_estimate_is_withheld(graph):
 
 def test_a_motor_that_holds_is_recognised(graph):
     gains = {'feedback.p': [2.0], 'feedback.d': [0.05], 'integration_step': 2.5e-4}
-    suite = Suite(graph, 1.1, **gains)
-    report = suite.move(1.0)
+    suite = Tuned(graph, 1.1, **gains)
+    report = suite.report(1.0)
     assert report['estimate_basis'] == 'held'
     assert float(report['stiffness_estimate']) == pytest.approx(1.1 * STIFFNESS, rel=5e-3)
 
@@ -280,13 +247,7 @@ def test_auto_tune_leaves_estimates_from_other_motions_alone(graph):
         **{'start.position': [0.0, 0.0]},
     )
     bench.report(report_msg())
-    goal = JointTrajectory(joint_names=['joint1'])
-    goal.points = [
-        JointTrajectoryPoint(positions=[1.0], time_from_start=conversions.duration_msg(1.0))
-    ]
-    graph.publish('/flat_planner/goal', goal)
-    graph.expect(lambda: bench.status, 'a verdict')
-    start = float(values(bench.status[0])['start_time'])
+    start = float(ask(graph, bench.status, goal(1.0))['start_time'])
     bench.report(report_msg(start=start - 1.0))
     assert bench.model() == [STIFFNESS, DAMPING]
     bench.report(report_msg(start=f'{start:.9f}'))

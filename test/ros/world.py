@@ -12,12 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The three nodes in processes of their own, from the outside."""
+"""The three nodes, from the outside: what a goal is, what they answer, what the arm does."""
 
 from time import monotonic
 
 from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros.monitor_node import MonitorNode
+from flat_planner_ros.ros.planner_node import PlannerNode
+from flat_planner_ros.ros.plant_node import PlantNode
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
@@ -28,6 +31,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 NODES = ('planner_node', 'plant_node', 'monitor_node')
 COMMAND, STATUS = '/flat_planner/joint_trajectory', '/flat_planner/status'
+REPORT = '/flat_monitor/report'
 EVERY_VERDICT = QoSProfile(depth=1000, durability=interfaces.LATCHED.durability)
 ANSWERS = ('ACCEPTED', 'REJECTED')
 
@@ -37,11 +41,12 @@ START_DELAY = 0.5
 NOT_YET = ('START_STATE_UNKNOWN', 'START_STATE_STALE', 'NOT_AT_REST')
 
 
-def goal(position, duration=1.0):
-    """Return a goal for joint 1."""
-    point = JointTrajectoryPoint(positions=[float(position)])
+def goal(positions, duration=1.0):
+    """Return a goal for joint 1, or for the first joints."""
+    point = JointTrajectoryPoint(positions=np.ravel(positions).astype(float).tolist())
     point.time_from_start = conversions.duration_msg(duration)
-    return JointTrajectory(joint_names=['joint1'], points=[point])
+    names = [f'joint{i + 1}' for i in range(len(point.positions))]
+    return JointTrajectory(joint_names=names, points=[point])
 
 
 def values(msg):
@@ -79,7 +84,58 @@ def move(graph, status, message, topic='/flat_planner/goal'):
         graph.spin_until(lambda: False, 0.1)
 
 
-class World:
+class Observer:
+    """Somebody with a `graph` who collects an arm's `states`."""
+
+    def wait_until(self, time):
+        """Wait for a joint state stamped then or later."""
+        self.graph.expect(lambda: self.states and stamp(self.states[-1]) >= time, f'{time} s')
+
+
+class Suite(Observer):
+    """The three nodes in this process, the plant owning the time, and what they say."""
+
+    def __init__(self, graph, planner=None, plant=None, *given, speed=3.0, window=2.0):
+        """
+        Start them, with parameters or what else is `given`; wait until they hear each other.
+
+        By default as many simulated seconds per second as one process keeps up with when busy.
+        """
+        self.graph = graph
+        simulated = {'use_sim_time': True}
+        slow = {'reference_rate': 10.0, 'start_delay': START_DELAY}
+        clock = {'publish_clock': True, 'real_time_factor': speed}
+        self.planner = graph.create(PlannerNode, {**simulated, **slow, **(planner or {})}, *given)
+        graph.create(MonitorNode, {**simulated, 'window': window}, *given)
+        graph.create(PlantNode, {**clock, **(plant or {})}, *given)
+        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
+        self.reports = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED)
+        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
+        self.commands = graph.collect(JointTrajectory, COMMAND)
+        self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
+        graph.expect(
+            lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
+            'the three nodes on joint_states',
+        )
+
+    def send(self, positions, duration=1.0):
+        """Send a goal; return its verdict."""
+        return ask(self.graph, self.status, goal(positions, duration))
+
+    def move(self, positions, duration=1.0):
+        """Carry a goal out; return the values of its verdict and of the report on its motion."""
+        count = len(self.reports)
+        verdict = self.send(positions, duration)
+        assert verdict['state'] == 'ACCEPTED', self.status
+        self.graph.expect(lambda: len(self.reports) > count, 'a report')
+        return verdict, values(self.reports[-1])
+
+    def verdicts(self, *states):
+        """Return the values of all verdicts with one of these states."""
+        return [v for v in map(values, self.status) if v['state'] in states]
+
+
+class World(Observer):
     """The three nodes in processes, and what they say."""
 
     def __init__(self, graph, *programs, arguments=(), **environment):
@@ -90,9 +146,7 @@ class World:
         self.states = graph.collect(JointState, '/joint_states', matched=False)
         self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT, matched=False)
         self.commands = graph.collect(JointTrajectory, COMMAND, matched=False)
-        self.reports = graph.collect(
-            DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED, matched=False
-        )
+        self.reports = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED, matched=False)
         self.processes = {}
         self.start(*programs or ['demo'])
 
@@ -124,10 +178,6 @@ class World:
         self.begin = float(verdict['start_time'])
         self.end = self.begin + float(verdict['duration'])
         return verdict
-
-    def wait_until(self, time):
-        """Wait for a joint state stamped then or later."""
-        self.graph.expect(lambda: self.states and stamp(self.states[-1]) >= time, f'{time} s')
 
     def amplitude(self):
         """Return what the monitor says of the present motion [rad]."""

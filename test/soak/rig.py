@@ -21,15 +21,15 @@ from pathlib import Path
 from time import monotonic, time
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros import conversions, interfaces
+from flat_planner_ros.ros import interfaces
 import numpy as np
 from rclpy.qos import QoSProfile
 from ros.conftest import Graph
 from ros.relay import Faults, Relay
-from ros.world import ANSWERS, EVERY_VERDICT, NODES, stamp, values
+from ros.world import answers, COMMAND, EVERY_VERDICT, goal, NODES, REPORT, stamp, STATUS, values
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
 
@@ -99,7 +99,6 @@ class Rig:
         self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
         self.offsets: list[tuple[float, float]] = []
         self._born, self._looked = monotonic(), 0.0
-        simulated = '' if speed is None else 'true'
         self._parameters = {
             'flat_planner:start_delay': 0.3,
             'flat_planner:replan.lookahead': 0.6,
@@ -107,7 +106,7 @@ class Rig:
             'flat_monitor:window': 1.5,
             'flat_plant:publish_rate': 100.0,
         }
-        if simulated:
+        if speed is not None:
             self._parameters |= {
                 'flat_planner:use_sim_time': True,
                 'flat_monitor:use_sim_time': True,
@@ -120,17 +119,13 @@ class Rig:
             graph.add(Relay(JointTrajectory, source, target, seed=seed + 1, **own))
             for source, target in (
                 ('/goals', '/flat_planner/goal'),
-                ('/flat_planner/joint_trajectory', '/late/joint_trajectory'),
+                (COMMAND, '/late/joint_trajectory'),
             )
         )
         self.state: JointState | None = None
         graph.probe.create_subscription(JointState, '/joint_states', self._on_state, NEWEST)
-        self.status = graph.collect(
-            DiagnosticArray, '/flat_planner/status', EVERY_VERDICT, matched=False
-        )
-        self.reports = graph.collect(
-            DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED, matched=False
-        )
+        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT, matched=False)
+        self.reports = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED, matched=False)
         self.processes = {}
         for name in NODES:
             self.start(name)
@@ -142,7 +137,7 @@ class Rig:
         ready = len(self.graph.logged('ready'))
         words = ['--ros-args', '--params-file', self._file]
         for key, value in self._parameters.items():
-            words += ['-p', f'{key}:={str(value).lower() if value is True else value}']
+            words += ['-p', f'{key}:={value}']
         words += ['-r', 'flat_plant:flat_planner/joint_trajectory:=/late/joint_trajectory']
         process = self.graph.start(name, *words)
         self.processes[name] = process
@@ -217,7 +212,7 @@ class Rig:
         self._expect(lambda: self.goals.is_idle and self.commands.is_idle, 'idle relays')
         delivered = len(self.goals.delivered)
         self._expect(lambda: self._answered() >= delivered, 'all verdicts')
-        accepted = [v for v in self._verdicts() if v['state'] == 'ACCEPTED']
+        accepted = [v for v in answers(self.status) if v['state'] == 'ACCEPTED']
         self.counts['goals'] += len(self.goals.received)
         self.counts['goals lost or doubled'] += abs(delivered - len(self.goals.received))
         self.counts['goals arrived'] += delivered
@@ -280,11 +275,9 @@ class Rig:
 
     def _send(self, pose: list[float]) -> None:
         """Send a goal through the relay."""
-        point = JointTrajectoryPoint(positions=pose)
-        point.time_from_start = conversions.duration_msg(float(self.random.uniform(1.2, 2.0)))
-        names = [f'joint{index + 1}' for index in range(self.joints)]
+        message = goal(pose, self.random.uniform(1.2, 2.0))
         received = len(self.goals.received)
-        self.graph.publish('/goals', JointTrajectory(joint_names=names, points=[point]))
+        self.graph.publish('/goals', message)
         self._expect(lambda: len(self.goals.received) > received, 'the goal at the relay')
 
     def _move(self) -> dict[str, str]:
@@ -295,23 +288,19 @@ class Rig:
             self._expect(lambda: self.goals.is_idle, 'an idle relay')
             if len(self.goals.delivered) > delivered:
                 self._expect(lambda: self._answered() >= len(self.goals.delivered), 'a verdict')
-                accepted = [v for v in self._verdicts() if v['state'] == 'ACCEPTED']
+                accepted = [v for v in answers(self.status) if v['state'] == 'ACCEPTED']
                 if accepted:
                     return accepted[-1]
                 self._wait(0.3)
-        raise AssertionError('no goal is accepted: ' + self._verdicts()[-1]['error_name'])
+        raise AssertionError('no goal is accepted: ' + answers(self.status)[-1]['error_name'])
 
     def _all(self) -> list[dict[str, str]]:
         """Return the values of all statuses."""
         return [values(message) for message in self.status]
 
-    def _verdicts(self) -> list[dict[str, str]]:
-        """Return the values of the verdicts on goals."""
-        return [v for v in self._all() if v.get('state') in ANSWERS]
-
     def _answered(self) -> int:
         """Return the number of verdicts on goals."""
-        return len(self._verdicts())
+        return len(answers(self.status))
 
     def _ended(self, verdict: dict[str, str]) -> list[dict[str, str]]:
         """Return how an accepted goal has ended."""
