@@ -34,12 +34,12 @@ DURATION = 1.0
 
 class Scenario(NamedTuple):
     """
-    One of the three scenarios.
+    One of the scenarios.
 
     Attributes
     ----------
     number
-        As in the paper.
+        As in the paper, which has three.
     title
         What distinguishes it.
     damping_factor

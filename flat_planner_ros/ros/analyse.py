@@ -16,6 +16,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 import json
 from pathlib import Path
@@ -126,23 +127,12 @@ def _settings(
     options: Namespace, recording: 'Recording', sources: 'Sources'
 ) -> list[tuple[int, MonitorSettings]]:
     """Return the monitor's settings with the times from which they hold [ns]."""
-    from dataclasses import replace
-
     from flat_planner_ros.ros.replay import recorded_settings
 
     if options.params_file is not None:
         node = f'{options.namespace.strip("/")}/{interfaces.MONITOR}'
-        known = [
-            (
-                0,
-                read_settings(
-                    options.params_file,
-                    monitor_parameters.ROWS,
-                    monitor_parameters.build,
-                    node=node,
-                ),
-            )
-        ]
+        rows, build = monitor_parameters.ROWS, monitor_parameters.build
+        known = [(0, read_settings(options.params_file, rows, build, node=node))]
     else:
         known = recorded_settings(recording, sources) or [(0, MonitorSettings())]
     if options.window is not None:

@@ -172,27 +172,6 @@ def goal_from_joint_state(msg: JointState) -> Goal:
     return Goal(joint_names=tuple(msg.name), points=(point,), stamp=_stamp(msg))
 
 
-def sample_from_joint_state(msg: JointState, joints: Sequence[str]) -> JointSample:
-    """
-    Return a measured state in the order of the arm's joints.
-
-    Parameters
-    ----------
-    msg
-        Joints by name, in any order, perhaps with others among them; velocity and effort may be
-        empty or NaN.
-    joints
-        The arm's joints.
-
-    Raises
-    ------
-    InvalidRequest
-        A joint is missing or the arrays do not fit the names.
-
-    """
-    return JointStateReader(joints).read(msg)
-
-
 class JointStateReader:
     """
     Reads joint states of a source that names its joints in the same order every time.
@@ -213,7 +192,23 @@ class JointStateReader:
         self._indices: NDArray[np.intp] | slice = slice(None)
 
     def read(self, msg: JointState) -> JointSample:
-        """Return what `sample_from_joint_state` does; its arrays may be views of the message's."""
+        """
+        Return a measured state in the order of the arm's joints.
+
+        Its arrays may be views of the message's.
+
+        Parameters
+        ----------
+        msg
+            Joints by name, in any order, perhaps with others among them; velocity and effort may
+            be empty or NaN.
+
+        Raises
+        ------
+        InvalidRequest
+            A joint is missing or the arrays do not fit the names.
+
+        """
         names = msg.name
         if names != self._names:
             self._indices = slice(None) if names == self.joints else select(names, self.joints)

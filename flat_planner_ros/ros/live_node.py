@@ -39,7 +39,7 @@ LIVE_VIEW = 'flat_live_view'
 """Name of the node."""
 
 MEASURED, REFERENCE, RESIDUAL = STREAMS = ('measured', 'reference', 'residual')
-"""Names of the streams; a row is the time and what `_row` says."""
+"""Names of the streams; a row is the time, positions, velocities and efforts."""
 
 ROW_PERIOD = 0.01
 """Shortest real time between two rows of a stream [s]; the page shows no more."""
@@ -165,6 +165,7 @@ class LiveNode(Node):
     def _listen(self) -> None:
         """Subscribe to all that the page shows."""
         planner, monitor, of = interfaces.PLANNER, interfaces.MONITOR, interfaces.of
+        latched, history = interfaces.LATCHED, interfaces.LATCHED_HISTORY
         for stream, topic in (
             (MEASURED, interfaces.JOINT_STATES),
             (REFERENCE, of(planner, interfaces.REFERENCE)),
@@ -174,24 +175,9 @@ class LiveNode(Node):
                 JointState, topic, self._receiver(stream), interfaces.SENSOR_DATA, raw=True
             )
         for kind, topic, take, quality in (
-            (
-                JointTrajectory,
-                of(planner, interfaces.PLAN),
-                self._on_plan,
-                interfaces.LATCHED,
-            ),
-            (
-                DiagnosticArray,
-                of(planner, interfaces.STATUS),
-                self._on_status,
-                interfaces.LATCHED_HISTORY,
-            ),
-            (
-                DiagnosticArray,
-                of(monitor, interfaces.REPORT),
-                self._on_report,
-                interfaces.LATCHED,
-            ),
+            (JointTrajectory, of(planner, interfaces.PLAN), self._on_plan, latched),
+            (DiagnosticArray, of(planner, interfaces.STATUS), self._on_status, history),
+            (DiagnosticArray, of(monitor, interfaces.REPORT), self._on_report, latched),
         ):
             self.create_subscription(kind, topic, take, quality)
 

@@ -330,7 +330,8 @@ def _goal(start: float) -> JointTrajectory:
 
 def _recording(states: Sequence[JointState], start: float) -> Recording:
     """Return the joint states of one run on the time axis of its motion."""
-    samples = [conversions.sample_from_joint_state(s, EXAMPLE_ARM['joints']) for s in states]
+    reader = conversions.JointStateReader(EXAMPLE_ARM['joints'])
+    samples = [reader.read(state) for state in states]
     return Recording(
         times=np.array([sample.time for sample in samples]) - start,
         positions=np.array([sample.positions for sample in samples]),

@@ -323,13 +323,7 @@ def arm_of(
     common = {name: _required(values, f'model.{name}') for name in ('stiffness', 'damping')}
     common['gravity'] = values.get('model.gravity', 0.0)
     for kind in ('viscous', 'coulomb'):
-        friction = values.get(f'friction.{kind}')
-        if friction is not None and len(friction) != len(joints) - 1:
-            raise InvalidParameter(
-                f'friction.{kind} needs one number per actuated joint, {len(joints) - 1}, '
-                f'got {len(friction)}'
-            )
-        common[f'{kind}_friction'] = friction
+        common[f'{kind}_friction'] = per_joint(values, f'friction.{kind}', len(joints) - 1)
     reduced = 'model.inertia_star' in values
     links = {name: values[f'model.{name}'] for name in LINK_ARRAYS if f'model.{name}' in values}
     if reduced:
@@ -376,6 +370,18 @@ LINK_ARRAYS = (
     'counterbalance_arm',
 )
 """The arrays of the full form of the model."""
+
+
+def per_joint(
+    values: Values, name: str, count: int, kind: str = 'actuated joint'
+) -> tuple[float, ...] | None:
+    """Return an array with an entry for each of some joints, None where it is not given."""
+    numbers = values.get(name)
+    if numbers is None:
+        return None
+    if len(numbers) != count:
+        raise InvalidParameter(f'{name} needs one number per {kind}, {count}, got {len(numbers)}')
+    return tuple(numbers)
 
 
 def _required(values: Values, name: str) -> Any:

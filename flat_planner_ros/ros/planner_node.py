@@ -59,6 +59,7 @@ class PlannerNode(Node):
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
+        self._reader = conversions.JointStateReader(self._joints)
         self._sent_start: float | None = None
         publish = self.create_publisher
         self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
@@ -132,7 +133,7 @@ class PlannerNode(Node):
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
         try:
-            self._session.measure(conversions.sample_from_joint_state(msg, self._joints))
+            self._session.measure(self._reader.read(msg))
         except FlatPlannerError as error:
             self._watch.heard_other_part()
             self.get_logger().warning(

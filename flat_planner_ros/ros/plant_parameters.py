@@ -18,7 +18,14 @@ from dataclasses import dataclass
 from enum import Enum
 
 from flat_planner_ros.core import Sensing, SimulationSettings
-from flat_planner_ros.ros.parameters import arm_of, InvalidParameter, model_rows, Row, Values
+from flat_planner_ros.ros.parameters import (
+    arm_of,
+    InvalidParameter,
+    model_rows,
+    per_joint,
+    Row,
+    Values,
+)
 from rclpy.parameter import Parameter
 
 
@@ -195,6 +202,7 @@ def build(values: Values) -> PlantSettings:
             f'mismatch.imbalance needs two numbers, for links n-1 and n, got {len(imbalance)}'
         )
     joints, arm = arm_of(values, imbalance)
+    n = len(joints)
     publish_clock, factor = values['publish_clock'], values['real_time_factor']
     if factor != 1.0 and not publish_clock:
         raise InvalidParameter(
@@ -207,12 +215,12 @@ def build(values: Values) -> PlantSettings:
             damping=values['mismatch.damping_scale'],
             inertia=values['mismatch.inertia_scale'],
         ),
-        position=_per_joint(values, 'initial_position', len(joints)) or (0.0,) * len(joints),
+        position=per_joint(values, 'initial_position', n, 'joint') or (0.0,) * n,
         rate=values['publish_rate'],
         step=values['integration_step'],
-        saturation=_per_joint(values, 'torque.saturation', len(joints) - 1),
-        feedback_p=_per_joint(values, 'feedback.p', len(joints) - 1),
-        feedback_d=_per_joint(values, 'feedback.d', len(joints) - 1),
+        saturation=per_joint(values, 'torque.saturation', n - 1),
+        feedback_p=per_joint(values, 'feedback.p', n - 1),
+        feedback_d=per_joint(values, 'feedback.d', n - 1),
         sensing=Sensing(
             position_std=values['noise.position_std'],
             seed=values['noise.seed'],
@@ -228,14 +236,3 @@ def build(values: Values) -> PlantSettings:
         publish_clock=publish_clock,
         real_time_factor=factor,
     )
-
-
-def _per_joint(values: Values, name: str, count: int) -> tuple[float, ...] | None:
-    """Return an array with an entry for each of some joints, None where it is not given."""
-    numbers = values.get(name)
-    if numbers is None:
-        return None
-    if len(numbers) != count:
-        kind = 'actuated joint' if name != 'initial_position' else 'joint'
-        raise InvalidParameter(f'{name} needs one number per {kind}, {count}, got {len(numbers)}')
-    return tuple(numbers)

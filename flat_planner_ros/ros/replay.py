@@ -14,7 +14,8 @@
 
 """What the monitor would have said, from a recording."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 import json
 from typing import Any
@@ -169,7 +170,8 @@ class _Player:
         if not conversions.is_stamped(msg):
             msg.header.stamp = conversions.time_msg(entry.time / conversions.NANOSECONDS)
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
-        _unless_refused(take, msg)
+        with suppress(FlatPlannerError):
+            take(msg)
 
     def end(self) -> None:
         """Judge a motion that is still watched: nothing more will come."""
@@ -216,14 +218,6 @@ class _Player:
         )
         # The next motion needs what came since this one began, at most.
         self._samples = [sample for sample in self._samples if sample.time >= motion.start]
-
-
-def _unless_refused(take: Callable[[Any], None], msg: Any) -> None:
-    """Take a message unless it is unusable: a recording holds what was sent, good or bad."""
-    try:
-        take(msg)
-    except FlatPlannerError:
-        return
 
 
 def _find(

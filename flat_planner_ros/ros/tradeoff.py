@@ -166,7 +166,6 @@ def _print(points: Sequence[TradeoffPoint], box: str) -> None:
     for point in points:
         if point.weight == 0.0:
             print(_line(point))
-    least = min(point.rms_effort for point in points)
     reference = next(point for point in points if point.weight == 0.0)
     print(
         f'insensitive, with at most the effort of {reference.series} ({reference.rms_effort:.4g}):'
@@ -177,7 +176,7 @@ def _print(points: Sequence[TradeoffPoint], box: str) -> None:
             for p in points
             if (p.series, p.duration) == (name, duration)
             and p.weight > 0.0
-            and p.rms_effort <= max(reference.rms_effort, least)
+            and p.rms_effort <= reference.rms_effort
         ]
         if within:
             print(_line(min(within, key=lambda p: p.worst)))

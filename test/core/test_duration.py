@@ -44,9 +44,6 @@ RATIOS = {
 }
 """What strategies with the weights 150 and 17 take with the exact map, relative to that [-]."""
 
-EITHER_MAP = 5e-3
-"""The torque of the approximate map differs a little; its laws take at most this much more [-]."""
-
 RANGE = {'shortest': 0.05, 'longest': 600.0}
 
 RANDOM_CASES = 12
@@ -178,7 +175,7 @@ def test_the_answer_obeys_and_nothing_shorter_does(seed):
     assert all(use.exceeded for use in worst)
 
 
-def test_velocity_alone_gives_the_time_of_the_polynomials_peak(paper_arm):
+def test_velocity_alone_gives_the_time_of_the_polynomials_peak():
     # Without an elastic effect to speak of, q1' is w', whose peak is 693/256 of its mean.
     stiff = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-9), stiffness=3e-1, damping=0.0)
     limits = JointLimits.of(2, velocity=[6.0, inf])
@@ -296,7 +293,7 @@ def test_a_range_without_durations_is_refused(paper_arm, span):
         )
 
 
-def test_times_of_scaled_limits_scale_as_the_dynamics_do(paper_arm):
+def test_times_of_scaled_limits_scale_as_the_dynamics_do():
     # The polynomial law on a rigid arm: four times the torque, half the time.
     stiff = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-9), stiffness=3e-1, damping=0.0)
     motion = motions(stiff, [pi, 0.0], strategy=Strategy.POLYNOMIAL)

@@ -169,7 +169,7 @@ def test_poses_outside_the_range_are_refused_and_named():
     assert (error.joint, error.value, error.limit) == ('shoulder', 3.1, 3.0)
 
 
-def test_an_arm_just_outside_its_range_may_move_back_but_not_further_out(paper_arm):
+def test_an_arm_just_outside_its_range_may_move_back_but_not_further_out():
     limits = JointLimits.of(2, position_min=[0.0, -inf]).reaching(np.array([-0.005, 0.0]), 0.01)
     assert limits.position_min.tolist() == [-0.005, -inf]
     limits = JointLimits.of(2, position_min=[0.0, -inf]).reaching(np.array([-0.05, 0.0]), 0.01)

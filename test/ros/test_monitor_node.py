@@ -599,7 +599,7 @@ def test_a_reader_gives_the_sample_of_every_form_of_message():
         sample = reader.read(form(state_msg(time)))
         assert sample.time == time
         assert sample.positions.tolist() == plain.position.tolist()
-        again = conversions.sample_from_joint_state(form(state_msg(time)), JOINTS)
+        again = conversions.JointStateReader(JOINTS).read(form(state_msg(time)))
         for name in ('positions', 'velocities', 'efforts'):
             np.testing.assert_equal(getattr(sample, name), getattr(again, name))
         assert (sample.velocities is None) == (sample.efforts is None) == (form is _bare)
@@ -618,7 +618,7 @@ def test_a_residual_crosses_the_border_and_back():
         msg = conversions.residual_msg(header, list(JOINTS), residual)
         assert msg.header == header
         assert not msg.effort
-        sample = conversions.sample_from_joint_state(msg, JOINTS)
+        sample = conversions.JointStateReader(JOINTS).read(msg)
         assert sample.time == 1.7e9 + 0.25
         np.testing.assert_equal(sample.positions, residual.positions)
         np.testing.assert_equal(sample.velocities, velocities)

@@ -252,7 +252,7 @@ def refused_goals() -> dict[str, tuple[JointTrajectory, str, str]]:
     }
 
 
-def test_every_malformed_goal_gets_one_rejection_and_leaves_the_motion_alone(planner, graph):
+def test_every_malformed_goal_gets_one_rejection_and_leaves_the_motion_alone(planner):
     planner.send(goal(stamp=planner.now() + 60.0))
     cases = refused_goals()
     for name, (message, code, error_name) in cases.items():
@@ -437,7 +437,7 @@ def test_namespaces_and_remappings_hold(graph):
     assert planner.send(goal())['state'] == 'ACCEPTED'
 
 
-def test_an_internal_error_is_a_verdict_too(planner, graph):
+def test_an_internal_error_is_a_verdict_too(planner):
     planner.node._session.submit = None  # Anything that is not foreseen.
     verdict = planner.send(goal())
     assert (verdict['error_code'], verdict['error_name']) == ('-199', 'INTERNAL')

@@ -168,8 +168,8 @@ def test_joint_states_come_evenly_at_200_hz(graph):
     assert quiet(graph)
 
 
-@pytest.mark.parametrize(('rate', 'step'), [(1000.0, 1e-3), (30.0, 1 / 30)])
-def test_the_rate_may_be_chosen(graph, rate, step):
+@pytest.mark.parametrize('rate', [1000.0, 30.0])
+def test_the_rate_may_be_chosen(graph, rate):
     plant = Plant(graph, {'publish_rate': rate})
     plant.wait_until(plant.now() + 0.5)
     assert np.diff(plant.times) == pytest.approx(1.0 / rate, abs=1e-6)
