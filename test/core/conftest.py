@@ -12,12 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the tests of planning share: the arm of the paper and an oracle in many digits."""
+"""What the tests of planning share: the arm of the paper, how it swings, and an oracle."""
 
 from types import ModuleType
 
 from flat_planner_ros.core.arm import PlanarArm
+import numpy as np
 import pytest
+
+
+def envelope(arm: PlanarArm, angle: float, rate: float, *, held: bool = False) -> float:
+    """Return the envelope of the free elastic joint at an angle [rad] and a rate [rad/s]."""
+    mode = arm.natural_mode(held=held)
+    return float(np.hypot(angle, (rate + mode.decay_rate * angle) / mode.damped_frequency))
 
 
 @pytest.fixture(scope='session')

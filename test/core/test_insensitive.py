@@ -16,6 +16,7 @@
 
 from functools import cache
 
+from core.conftest import envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
@@ -228,9 +229,7 @@ def test_the_simulated_arm_swings_as_predicted(arm, final, factors, nominal):
     profile = EffortProfile(start=0.0, times=samples.times, efforts=samples.efforts[:, :-1])
     other = arm.scaled(stiffness=factors[0], damping=factors[1])
     motion = rollout(other, profile, 1.0, step=5e-4)
-    mode = other.natural_mode()
-    q, dq = motion.positions[-1, -1], motion.velocities[-1, -1]
-    amplitude = np.hypot(q, (dq + mode.decay_rate * q) / mode.damped_frequency)
+    amplitude = envelope(other, motion.positions[-1, -1], motion.velocities[-1, -1])
     oscillator = Oscillator.of(arm)
     poles = oscillator.poles(np.array([factors]))
     (predicted,) = residual_amplitude(oscillator, samples.torque, 1.0, poles)

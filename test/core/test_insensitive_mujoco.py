@@ -14,6 +14,7 @@
 
 """Commands of insensitive motions played by MuJoCo, on arms that differ from the model."""
 
+from core.conftest import envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.insensitivity import Insensitivity, Nominal
@@ -84,10 +85,8 @@ def test_mujoco_s_arm_swings_as_predicted(nominal, factors):
     result = plan(request, ARM, options)
     samples = result.sample(PERIOD)
     angles, rates = played(samples, *factors)
-    mode = ARM.scaled(stiffness=factors[0], damping=factors[1]).natural_mode()
-    amplitude = np.hypot(
-        angles[1], (rates[1] + mode.decay_rate * angles[1]) / mode.damped_frequency
-    )
+    other = ARM.scaled(stiffness=factors[0], damping=factors[1])
+    amplitude = envelope(other, angles[1], rates[1])
     oscillator = Oscillator.of(ARM)
     poles = oscillator.poles(np.array([factors]))
     (predicted,) = residual_amplitude(oscillator, samples.torque, 1.0, poles)

@@ -17,6 +17,7 @@
 from pathlib import Path
 import re
 
+from core.conftest import envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
@@ -59,12 +60,6 @@ def servo_course(samples, kind):
     return PPoly.from_bernstein_basis(joined)
 
 
-def amplitude(arm, angle, rate):
-    """Return the envelope of joint 2 about rest while joint 1 is held [rad]."""
-    mode = arm.natural_mode(held=True)
-    return float(np.hypot(angle, (rate + mode.decay_rate * angle) / mode.damped_frequency))
-
-
 def residual(arm, course):
     """
     Return the amplitude of joint 2 at the end of a course of joint 1 [rad].
@@ -81,7 +76,7 @@ def residual(arm, course):
     force = (k * course(at) + c * course.derivative()(at)) * weights * step / 2
     content = np.array([np.sum(np.exp(pole * (end - at)) * force) for pole in poles])
     state = (modes @ (np.linalg.solve(modes, [0.0, 1.0 / inertia]) * content)).real
-    return amplitude(arm, state[0] - course(end), state[1])
+    return envelope(arm, state[0] - course(end), state[1], held=True)
 
 
 def test_the_quadrature_agrees_with_an_integrator(motion):
@@ -93,7 +88,8 @@ def test_the_quadrature_agrees_with_an_integrator(motion):
 
     solution = solve_ivp(rate, (0.0, DURATION), [0.0, 0.0], rtol=1e-11, atol=1e-13)
     theta, speed = solution.y[:, -1]
-    assert residual(ARM, course) == pytest.approx(amplitude(ARM, theta - GOAL, speed), rel=1e-5)
+    expected = envelope(ARM, theta - GOAL, speed, held=True)
+    assert residual(ARM, course) == pytest.approx(expected, rel=1e-5)
 
 
 def documented(row):

@@ -14,6 +14,7 @@
 
 """Predicted residual: against the simulated arm, and its largest value on the box's boundary."""
 
+from core.conftest import envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
@@ -48,9 +49,7 @@ def simulated_amplitude(arm, times, torque, *, position=None, motors=1):
     profile = EffortProfile(start=0.0, times=times, efforts=efforts)
     motion = rollout(arm, profile, times[-1], step=step, position=position)
     assert motion.times[-1] == pytest.approx(times[-1], abs=1e-9)
-    mode = arm.natural_mode()
-    q, dq = motion.positions[-1, -1], motion.velocities[-1, -1]
-    return np.hypot(q, (dq + mode.decay_rate * q) / mode.damped_frequency)
+    return envelope(arm, motion.positions[-1, -1], motion.velocities[-1, -1])
 
 
 @pytest.mark.parametrize('factors', FACTORS)

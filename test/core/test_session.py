@@ -17,6 +17,7 @@
 from dataclasses import replace
 from math import inf, nan, pi
 
+from core.conftest import envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
@@ -434,9 +435,7 @@ def residual(track, arm) -> float:
     plant.reset(track.positions[0])
     plant.command(EffortProfile(start=0.0, times=track.times, efforts=track.efforts[:, :-1]), 0.0)
     plant.advance(track.times[-1])
-    mode = arm.natural_mode()
-    angle, rate = plant.position[-1], plant.velocity[-1]
-    return float(np.hypot(angle, (rate + mode.decay_rate * angle) / mode.damped_frequency))
+    return envelope(arm, plant.position[-1], plant.velocity[-1])
 
 
 @pytest.mark.parametrize('seed', range(5))

@@ -14,6 +14,7 @@
 
 """Four joints in a vertical plane: planned, then simulated by the full dynamics."""
 
+from core.conftest import envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.counterbalance import displaced_com
@@ -66,10 +67,8 @@ def played(plant, strategy=Strategy.MIN_CONTROL_EFFORT, nominal=None, after=1.0,
 def left(states):
     """Return the amplitude of the elastic joint at the end, and all joints' deviations then."""
     index = int(np.argmin(np.abs(states.times - DURATION)))
-    mode = arm_with().natural_mode()
-    angle, rate = states.positions[index, -1], states.velocities[index, -1]
-    amplitude = np.hypot(angle, (rate + mode.decay_rate * angle) / mode.damped_frequency)
-    return amplitude, np.abs(states.positions[index] - FINAL)
+    angles, rates = states.positions[index], states.velocities[index]
+    return envelope(arm_with(), angles[-1], rates[-1]), np.abs(angles - FINAL)
 
 
 @pytest.mark.parametrize('strategy', [Strategy.POLYNOMIAL, Strategy.MIN_CONTROL_EFFORT])

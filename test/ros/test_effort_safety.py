@@ -15,17 +15,15 @@
 """Nothing moves by itself: not after a restart, not from an old, late or foreign command."""
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros import conversions
+from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros.world import ask, COMMAND, EVERY_VERDICT, goal, move, Observer, stamp, START_DELAY, STATUS
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 PLAN = '/flat_planner/plan'
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 DURATION = 9.0
 """Of a motion [s]: long enough to restart a process in the middle of it."""
@@ -77,7 +75,7 @@ def test_a_plant_that_was_killed_in_a_motion_does_not_take_it_up_again(graph):
     watched.plant.kill()
     watched.start()
     assert stamp(watched.states[0]) < start + DURATION, 'restarted within the motion'
-    late = graph.collect(JointTrajectory, PLAN, LATCHED)
+    late = graph.collect(JointTrajectory, PLAN, interfaces.LATCHED)
     graph.expect(lambda: late, 'the plan, latched all the same')
     watched.wait_until(start + DURATION + 0.2)
     assert not watched.efforts().any()

@@ -16,6 +16,7 @@
 
 from math import pi
 
+from core.conftest import envelope
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm, rollout
 from flat_planner_ros.ros import interfaces
@@ -60,9 +61,7 @@ def simulated_amplitude(points, factor):
     arm = ARM.scaled(stiffness=factor, damping=factor)
     profile = EffortProfile(start=0.0, times=np.array(times), efforts=efforts)
     motion = rollout(arm, profile, times[-1], step=5e-4)
-    mode = arm.natural_mode()
-    q, dq = motion.positions[-1, 1], motion.velocities[-1, 1]
-    return np.hypot(q, (dq + mode.decay_rate * q) / mode.damped_frequency)
+    return envelope(arm, motion.positions[-1, 1], motion.velocities[-1, 1])
 
 
 @pytest.mark.parametrize('nominal', ['exact', 'free'])

@@ -21,7 +21,7 @@ from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
 import pytest
-from ros.world import goal, STATUS, values
+from ros.world import goal, STATUS, table, values
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -70,11 +70,6 @@ class Planner:
         """Return the continuous plan that was accepted last, sampled 100 001 times."""
         planned = self.node._session.motion.plan
         return planned.at(np.linspace(0.0, planned.duration, 100_001))
-
-
-def table(message, field):
-    """Return one field of all points, shape (points, joints)."""
-    return np.array([list(getattr(point, field)) for point in message.points])
 
 
 def assert_obeys(planner):

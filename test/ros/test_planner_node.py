@@ -23,6 +23,7 @@ from flat_planner_ros.ros.planner_node import PlannerNode
 from flat_planner_ros.ros.planner_parameters import ROWS
 import numpy as np
 import pytest
+from ros.world import table
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -98,11 +99,6 @@ def planner(graph):
     result = Planner(graph)
     result.measure()
     return result
-
-
-def table(message: JointTrajectory, field: str) -> np.ndarray:
-    """Return one field of all points, shape (points, joints)."""
-    return np.array([list(getattr(point, field)) for point in message.points])
 
 
 def test_an_accepted_goal_becomes_a_command_that_an_executor_can_play(planner):

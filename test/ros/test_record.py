@@ -30,7 +30,7 @@ from flat_planner_ros.ros.planner_node import PlannerNode
 from flat_planner_ros.ros.plant_node import PlantNode
 import numpy as np
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from ros.world import goal, values
 from sensor_msgs.msg import JointState
@@ -220,8 +220,7 @@ def test_a_recording_is_what_the_specification_of_mcap_asks_for(graph, tmp_path)
     path = tmp_path / 'states.mcap'
     recorder = record(graph, path)
     publish_states(graph, 20)
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    graph.publish('/flat_planner/plan', goal(1.0, 0.5), latched)
+    graph.publish('/flat_planner/plan', goal(1.0, 0.5), interfaces.LATCHED)
     graph.expect(lambda: ': 21 messages on 2 topics' in recorder.summary, 'all messages')
     graph.remove(recorder)
     with path.open('rb') as file:
@@ -243,8 +242,10 @@ def test_a_recording_is_what_the_specification_of_mcap_asks_for(graph, tmp_path)
 
 
 def test_what_was_latched_before_is_recorded_and_best_effort_is_heard(graph, tmp_path):
-    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    graph.probe.create_publisher(JointTrajectory, '/flat_planner/plan', latched).publish(goal(1.0))
+    latched = graph.probe.create_publisher(
+        JointTrajectory, '/flat_planner/plan', interfaces.LATCHED
+    )
+    latched.publish(goal(1.0))
     quality = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
     states = graph.probe.create_publisher(JointState, '/joint_states', quality)
     recorder = record(graph, tmp_path / 'x.mcap')

@@ -59,6 +59,11 @@ def stamp(msg):
     return conversions.seconds(msg.header.stamp)
 
 
+def table(trajectory, field):
+    """Return one field of all points, shape (points, joints)."""
+    return np.array([list(getattr(point, field)) for point in trajectory.points])
+
+
 def answers(status):
     """Return the values of all verdicts on goals."""
     return [v for v in map(values, status) if v.get('state') in ANSWERS]
