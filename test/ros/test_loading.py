@@ -15,13 +15,6 @@
 """What the nodes load when nothing moves yet, seen in the files that they have mapped."""
 
 from pathlib import Path
-import sys
-
-import pytest
-
-pytest.importorskip('rclpy')
-
-PROGRAMS = ('planner_node', 'monitor_node', 'plant_node')
 
 
 def has_loaded(process, part: str) -> bool:
@@ -30,9 +23,9 @@ def has_loaded(process, part: str) -> bool:
 
 
 def test_planner_and_monitor_load_before_the_first_motion_what_it_will_need(graph):
-    planner, monitor, plant = [
-        graph.run([sys.executable, '-m', f'flat_planner_ros.ros.{name}']) for name in PROGRAMS
-    ]
+    planner, monitor, plant = (
+        graph.start(name) for name in ('planner_node', 'monitor_node', 'plant_node')
+    )
     for process in (planner, monitor, plant):
         graph.expect(lambda process=process: 'ready' in process.stderr + process.stdout, 'a node')
     for process in (planner, monitor):

@@ -28,6 +28,7 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.exceptions import ParameterException
+from ros.world import Observer, stamp
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -53,7 +54,7 @@ PEAK = 1e-3
 """Of the efforts commanded here [N m]."""
 
 
-class Plant:
+class Plant(Observer):
     """The node under test and everything that it shows."""
 
     def __init__(self, graph, parameters=None, *arguments):
@@ -67,7 +68,7 @@ class Plant:
     @property
     def times(self) -> np.ndarray:
         """Return the stamps of all joint states [s]."""
-        return np.array([conversions.seconds(state.header.stamp) for state in self.states])
+        return np.array([stamp(state) for state in self.states])
 
     def table(self, field: str) -> np.ndarray:
         """Return an array of all joint states, shape (samples, joints)."""
@@ -75,7 +76,7 @@ class Plant:
 
     def now(self) -> float:
         """Return the stamp of the newest joint state [s]."""
-        return conversions.seconds(self.states[-1].header.stamp)
+        return stamp(self.states[-1])
 
     def time(self) -> float:
         """Return the plant's time, which joint states on their way do not show yet [s]."""
@@ -91,10 +92,6 @@ class Plant:
             time = min(newest(self.states) + 0.2, until) if self.states else until
             self.graph.publish('/clock', Clock(clock=conversions.time_msg(time)))
             self.graph.expect(lambda t=time: newest(self.states) > t - 0.01, f'{time:.3f} s')
-
-    def wait_until(self, time: float):
-        """Wait for a joint state stamped then or later."""
-        self.graph.expect(lambda: self.now() >= time, f'joint states until {time:.3f} s')
 
     def play(self, start: float, **fields):
         """Send a command and wait until it is over."""
@@ -146,7 +143,7 @@ def plant(graph) -> Plant:
 
 def newest(states) -> float:
     """Return the stamp of the last of some joint states, 0 without any [s]."""
-    return conversions.seconds(states[-1].header.stamp) if states else 0.0
+    return stamp(states[-1]) if states else 0.0
 
 
 def quiet(graph) -> bool:

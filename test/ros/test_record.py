@@ -102,20 +102,6 @@ def record(graph, path: Path, **options) -> RecorderNode:
     return graph.create(partial(RecorderNode, path, **options))
 
 
-def record_motion(graph, path: Path) -> RecorderNode:
-    """Return a recorder beside the three nodes, once it hears the topics that are there."""
-    recorder = record(graph, path)
-    for topic in ('/joint_states', '/flat_planner/joint_trajectory'):
-        graph.expect(
-            lambda topic=topic: any(
-                info.node_name == recorder.get_name()
-                for info in graph.probe.get_subscriptions_info_by_topic(topic)
-            ),
-            f'the recorder on {topic}',
-        )
-    return recorder
-
-
 def start_recorder(graph, *arguments: str):
     """Return a recorder in a process of its own, once it listens."""
     process = graph.start('record', *arguments)
@@ -134,25 +120,33 @@ def publish_states(graph, count: int) -> None:
         graph.publish('/joint_states', msg, 1000)
 
 
-def moved(graph, monitor: dict | None = None) -> list[DiagnosticArray]:
-    """Run the three nodes for some motions; return the reports."""
+def record_motion(graph, path: Path) -> list[DiagnosticArray]:
+    """Record the three nodes for a motion; return the reports."""
     graph.create(PlannerNode, {'start_delay': 0.5, 'start.joint_state_timeout': 30.0})
-    graph.create(MonitorNode, {'window': WINDOW, **(monitor or {})})
+    graph.create(MonitorNode, {'window': WINDOW})
     graph.create(PlantNode, {'mismatch.stiffness_scale': 1.1, 'noise.position_std': 1e-4})
     reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
     states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
     graph.expect(lambda: states, 'joint states')
+    recorder = record(graph, path)
+    for topic in ('/joint_states', '/flat_planner/joint_trajectory'):
+        graph.expect(
+            lambda topic=topic: any(
+                info.node_name == recorder.get_name()
+                for info in graph.probe.get_subscriptions_info_by_topic(topic)
+            ),
+            f'the recorder on {topic}',
+        )
+    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
+    graph.expect(lambda: reports, 'a report')
+    graph.expect(lambda: set(Recording(path).topics) >= OURS, 'all topics')
+    graph.remove(recorder)
     return reports
 
 
 def test_three_nodes_are_recorded_and_judged_again(graph, tmp_path, capsys):
     path = tmp_path / 'motion.mcap'
-    reports = moved(graph)
-    recorder = record_motion(graph, path)
-    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
-    graph.expect(lambda: reports, 'a report')
-    graph.expect(lambda: set(Recording(path).topics) >= OURS, 'all topics')
-    graph.remove(recorder)
+    reports = record_motion(graph, path)
 
     with highlevel.AnyReader([path]) as reader:
         assert set(reader.topics) >= OURS
@@ -398,11 +392,7 @@ def test_a_bag_of_another_storage_with_other_names_is_analysed(graph, tmp_path, 
     from rosbags.typesys import get_typestore, Stores
 
     path = tmp_path / 'motion.mcap'
-    reports = moved(graph)
-    recorder = record_motion(graph, path)
-    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
-    graph.expect(lambda: reports, 'a report')
-    graph.remove(recorder)
+    reports = record_motion(graph, path)
     names = {'/flat_planner/plan': '/robot/command', '/joint_states': '/robot/measured'}
     bag = tmp_path / 'bag'
     types = get_typestore(Stores.ROS2_JAZZY)
@@ -427,11 +417,7 @@ def test_a_bag_of_another_storage_with_other_names_is_analysed(graph, tmp_path, 
 def test_a_motion_is_drawn(graph, tmp_path):
     pytest.importorskip('matplotlib')
     path, picture = tmp_path / 'motion.mcap', tmp_path / 'motion.png'
-    reports = moved(graph)
-    recorder = record_motion(graph, path)
-    graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
-    graph.expect(lambda: reports, 'a report')
-    graph.remove(recorder)
+    record_motion(graph, path)
     assert analyse.main(['analyse', str(path), '--plot', str(picture)]) == 0
     assert picture.read_bytes().startswith(b'\x89PNG')
 

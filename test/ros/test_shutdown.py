@@ -18,7 +18,6 @@ import os
 from pathlib import Path
 import signal
 import sys
-from time import monotonic
 
 import numpy as np
 import pytest
@@ -75,12 +74,6 @@ def catches(pid: int, number: int) -> bool:
     return False
 
 
-def pause(graph, seconds: float) -> None:
-    """Let a time pass; what happens in it may be anything."""
-    end = monotonic() + seconds
-    graph.spin_until(lambda: monotonic() >= end, seconds + 1.0)
-
-
 def assert_clean(process) -> None:
     """Look at what a process leaves behind."""
     assert process.wait() == 0, process.stderr
@@ -96,21 +89,21 @@ def test_a_signal_at_any_moment_ends_a_program(graph, name, moment):
     index = MOMENTS.index(moment) + PROGRAMS.index(name)
     numbers = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGTERM)][index % 3]
     process = start(graph, name)
-    pause(graph, moment)
+    graph.spin_until(lambda: False, moment)
     for number in numbers:
         if process.exit_code is None:
             os.kill(process.pid, number)
-        pause(graph, 0.03 * (index % 2))
+        graph.spin_until(lambda: False, 0.03 * (index % 2))
     assert_clean(process)
 
 
 @pytest.mark.parametrize('seed', range(3))
 def test_a_hail_of_signals_does_no_more_than_one(graph, seed):
     process = start(graph, PROGRAMS[seed])
-    pause(graph, 0.4 * seed)
+    graph.spin_until(lambda: False, 0.4 * seed)
     while process.exit_code is None:
         os.kill(process.pid, signal.SIGINT if seed else signal.SIGTERM)
-        pause(graph, 0.005)
+        graph.spin_until(lambda: False, 0.005)
     assert_clean(process)
 
 
@@ -134,7 +127,7 @@ def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
 def test_a_tool_that_is_interrupted_ends_with_130_and_no_word(graph, number):
     many = ['--stretch', *map(str, np.linspace(1.0, 3.0, 500))]
     process = start(graph, 'tradeoff', '--final', '3.14', '--duration', '1', *many)
-    pause(graph, 0.5)
+    graph.spin_until(lambda: False, 0.5)
     assert process.stop(number) == 130
     assert process.stderr == ''
 
@@ -151,7 +144,7 @@ def test_a_program_says_that_it_is_ready_once(graph):
     parameters = Path(__file__).resolve().parents[2] / 'config' / 'arm_2dof.yaml'
     process = start(graph, 'plant_node', '--ros-args', '--params-file', str(parameters))
     graph.expect(lambda: '[flat_plant]: ready' in process.stderr, 'a word')
-    pause(graph, 0.3)
+    graph.spin_until(lambda: False, 0.3)
     assert process.stop() == 0
     assert len(process.stderr.splitlines()) == 1
 
