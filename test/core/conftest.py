@@ -20,6 +20,9 @@ from flat_planner_ros.core.arm import PlanarArm
 import numpy as np
 import pytest
 
+ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
+"""That of the paper's table, with its damping."""
+
 
 def envelope(arm: PlanarArm, angle: float, rate: float, *, held: bool = False) -> float:
     """Return the envelope of the free elastic joint at an angle [rad] and a rate [rad/s]."""
@@ -39,4 +42,4 @@ def oracle() -> ModuleType:
 @pytest.fixture
 def paper_arm() -> PlanarArm:
     """Return the arm of the paper's table, with its damping."""
-    return PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
+    return ARM

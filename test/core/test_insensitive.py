@@ -16,7 +16,7 @@
 
 from functools import cache
 
-from core.conftest import envelope
+from core.conftest import ARM, envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
@@ -35,7 +35,6 @@ from flat_planner_ros.core.rollout import rollout
 import numpy as np
 import pytest
 
-ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3.0e-3, damping=2.0e-5)
 ELBOW = PlanarArm.reduced(
     inertia_star=(6.4e-4, 3.3e-5),
     stiffness=3.0e-3,

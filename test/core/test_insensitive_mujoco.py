@@ -14,8 +14,7 @@
 
 """Commands of insensitive motions played by MuJoCo, on arms that differ from the model."""
 
-from core.conftest import envelope
-from flat_planner_ros.core.arm import PlanarArm
+from core.conftest import ARM, envelope
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.insensitivity import Insensitivity, Nominal
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
@@ -26,7 +25,6 @@ import pytest
 
 mujoco = pytest.importorskip('mujoco')
 
-ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3.0e-3, damping=2.0e-5)
 PERIOD = 0.005
 SUBSTEPS = 10
 

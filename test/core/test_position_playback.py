@@ -17,8 +17,7 @@
 from pathlib import Path
 import re
 
-from core.conftest import envelope
-from flat_planner_ros.core.arm import PlanarArm
+from core.conftest import ARM, envelope
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.flatness import FlatModel
@@ -30,7 +29,6 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly, PPoly
 
 TEXT = (Path(__file__).resolve().parents[2] / 'docs' / 'real_robot.md').read_text('utf-8')
-ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
 GOAL = np.pi
 DURATION = 1.0
 SEED = 11

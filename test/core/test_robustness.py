@@ -14,7 +14,7 @@
 
 """Predicted residual: against the simulated arm, and its largest value on the box's boundary."""
 
-from core.conftest import envelope
+from core.conftest import ARM, envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
@@ -28,7 +28,6 @@ from flat_planner_ros.core.rollout import rollout
 import numpy as np
 import pytest
 
-ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3.0e-3, damping=2.0e-5)
 FACTORS = [(1.0, 1.0), (1.1, 1.1), (0.9, 0.9), (1.1, 0.9), (0.5, 1.8), (1.7, 0.0)]
 
 

@@ -16,9 +16,9 @@
 
 from math import pi
 
-from core.conftest import envelope
+from core.conftest import ARM, envelope
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm, rollout
+from flat_planner_ros.core import EffortProfile, FlatPlannerError, rollout
 from flat_planner_ros.ros import interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
 import numpy as np
@@ -26,7 +26,6 @@ import pytest
 from ros.world import ask, goal, STATUS
 from trajectory_msgs.msg import JointTrajectory
 
-ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3.0e-3, damping=2.0e-5)
 REST = {'start.source': 'parameter', 'start.position': [0.0, 0.0], 'execute': False}
 
 
