@@ -34,7 +34,7 @@ export function ticks(low, high, most) {
   return {found: [], decimals: 0};
 }
 
-// One plot. `lines` are {rows, column, factor, colour, dashed, after, before}.
+// One plot. `lines` are {rows, column, factor, colour, dashed}.
 export class Plot {
   constructor(canvas, smallest) {
     this.canvas = canvas;
@@ -124,9 +124,9 @@ export class Plot {
     c.stroke();
   }
 
-  line(c, {rows, column, factor = 1, colour: name, dashed, width = 1.6}, X, Y) {
+  line(c, {rows, column, factor = 1, colour: name, dashed}, X, Y) {
     c.strokeStyle = colour(name);
-    c.lineWidth = dashed ? 1.1 : width;
+    c.lineWidth = dashed ? 1.1 : 1.6;
     c.setLineDash(dashed ? [5, 4] : []);
     c.beginPath();
     let last = -Infinity;
