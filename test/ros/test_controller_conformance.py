@@ -28,10 +28,11 @@ from flat_planner_ros.ros.planner_node import PlannerNode
 from flat_planner_ros.ros.planner_parameters import ROWS
 import numpy as np
 import pytest
+from ros.world import goal
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from trajectory_controller import broken, Controller, PRECAUTIONS, REFUSALS
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 import yaml
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
@@ -79,13 +80,10 @@ class Session:
             'the time',
         )
 
-    def command(self, angles, duration, joints=('joint1',)):
+    def command(self, angles, duration):
         """Return the command that answers a goal, and when it was received."""
-        goal = JointTrajectory(joint_names=list(joints))
-        point = JointTrajectoryPoint(positions=np.ravel(angles).tolist())
-        point.time_from_start = conversions.duration_msg(duration)
-        goal.points = [point]
-        return self.answer(lambda: self.graph.publish('flat_planner/goal', goal))
+        message = goal(angles, duration)
+        return self.answer(lambda: self.graph.publish('flat_planner/goal', message))
 
     def answer(self, ask):
         """Return the next command and the time."""
@@ -136,7 +134,7 @@ def test_commands_of_every_shipped_arm_are_played(graph, file):
     start = [0.0] * len(joints)
     session = Session(graph, **{**values, 'start.source': 'parameter', 'start.position': start})
     for duration in (1.37, 2.0):
-        msg, now = session.command([0.4] * (len(joints) - 1), duration, joints[:-1])
+        msg, now = session.command([0.4] * (len(joints) - 1), duration)
         assert broken(player, msg, now) == []
         assert tuple(msg.joint_names) == joints
         last = msg.points[-1]

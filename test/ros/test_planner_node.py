@@ -20,7 +20,6 @@ import signal
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.ros import conversions, interfaces
 from flat_planner_ros.ros.planner_node import PlannerNode
-from flat_planner_ros.ros.planner_parameters import ROWS
 import numpy as np
 import pytest
 from ros.world import table
@@ -509,10 +508,3 @@ def test_the_start_position_may_be_a_parameter(graph):
     assert verdict['state'] == 'ACCEPTED'
     graph.expect(lambda: planner.plans, 'the plan')
     assert planner.plans[0].points[0].positions[0] == 0.5
-
-
-def test_descriptions_tell_what_every_parameter_is(planner):
-    names = {row.name for row in ROWS}
-    assert len(names) > 30
-    assert names <= set(planner.node._parameters)
-    assert all(planner.node.describe_parameter(name).description for name in names)

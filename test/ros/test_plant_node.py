@@ -23,7 +23,6 @@ from flat_planner_ros.core import EffortProfile, FlatPlannerError, PacedArm, Pla
 from flat_planner_ros.ros import conversions
 from flat_planner_ros.ros.parameters import EXAMPLE_ARM
 from flat_planner_ros.ros.plant_node import CLOCK_START, PlantNode
-from flat_planner_ros.ros.plant_parameters import ROWS
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
@@ -597,11 +596,6 @@ def test_changes_that_make_no_sense_are_refused_with_a_reason(plant, graph):
         assert answer.reason
         assert text in answer.reason
     assert plant.node._arm.settings.arm.stiffness == PAPER.stiffness
-
-
-def test_descriptions_tell_what_every_parameter_is(plant):
-    for row in ROWS:
-        assert plant.node.describe_parameter(row.name).description
 
 
 @pytest.mark.parametrize(
