@@ -150,18 +150,24 @@ class ReferenceLaw:
             return np.array(columns).T
 
 
+def solutions(roots: Roots) -> list[tuple[mp.mpc, int, bool]]:
+    """Return rate, power of time and whether it counts from the end, of all exponentials."""
+    functions = []
+    for z, multiplicity in roots:
+        if z == 0:
+            functions += [(mp.mpc(0), power, False) for power in range(2 * multiplicity)]
+            continue
+        beta = mp.sqrt(mp.mpmathify(z))
+        for power in range(multiplicity):
+            functions += [(beta, power, True), (-beta, power, False)]
+    return functions
+
+
 def solve(roots: Roots, duration: float, start, end) -> ReferenceLaw:
     """Return the law whose derivatives 0 to 5 are start at 0 and end at the duration."""
     with mp.workdps(DIGITS):
         length = mp.mpf(duration)
-        functions = []
-        for z, multiplicity in roots:
-            if z == 0:
-                functions += [(mp.mpc(0), power, False) for power in range(2 * multiplicity)]
-                continue
-            beta = mp.sqrt(mp.mpmathify(z))
-            for power in range(multiplicity):
-                functions += [(beta, power, True), (-beta, power, False)]
+        functions = solutions(roots)
         size = 2 * CONDITIONS
         matrix, target = mp.matrix(size, size), mp.matrix(size, 1)
         # Rows and columns in units of the duration, so that the solver's pivots are comparable.

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import mpmath as mp
 import numpy as np
-from oracle import _derivatives, CONDITIONS, ReferenceLaw, Roots
+from oracle import _derivatives, CONDITIONS, ReferenceLaw, Roots, solutions
 
 ORDERS = 2 * CONDITIONS
 """Derivatives 0 to 11."""
@@ -76,14 +76,7 @@ def solve_path(
     with mp.workdps(digits):
         delta = mp.mpf(float(relaxation))
         lengths = [mp.mpf(float(h)) for h in np.diff(edges)]
-        functions = []
-        for z, multiplicity in roots:
-            if z == 0:
-                functions += [(mp.mpc(0), power, False) for power in range(2 * multiplicity)]
-                continue
-            beta = mp.sqrt(mp.mpmathify(z))
-            for power in range(multiplicity):
-                functions += [(beta, power, True), (-beta, power, False)]
+        functions = solutions(roots)
         unit = max(lengths)
         count = len(lengths)
         size = ORDERS * count

@@ -14,6 +14,7 @@
 
 """What the tests of planning share: the arm of the paper, how it swings, and an oracle."""
 
+from dataclasses import replace
 from types import ModuleType
 
 from flat_planner_ros.core.arm import PlanarArm
@@ -22,6 +23,18 @@ import pytest
 
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
 """That of the paper's table, with its damping."""
+
+ELBOW = PlanarArm.reduced(
+    inertia_star=(6.4e-4, 3.3e-5),
+    stiffness=3e-3,
+    damping=2e-5,
+    link_length=[0.2],
+    link_com=[0.1],
+    link_mass=[0.3],
+    link_inertia=[1e-3],
+    tip_mass=0.1,
+)
+"""The same behind a first link."""
 
 
 def envelope(arm: PlanarArm, angle: float, rate: float, *, held: bool = False) -> float:
@@ -41,5 +54,5 @@ def oracle() -> ModuleType:
 
 @pytest.fixture
 def paper_arm() -> PlanarArm:
-    """Return the arm of the paper's table, with its damping."""
-    return ARM
+    """Return the arm of the paper's table, made anew: plans remember arms."""
+    return replace(ARM)

@@ -16,7 +16,7 @@
 
 from functools import cache
 
-from core.conftest import ARM, envelope
+from core.conftest import ARM, ELBOW, envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.effort_profile import EffortProfile
@@ -35,16 +35,6 @@ from flat_planner_ros.core.rollout import rollout
 import numpy as np
 import pytest
 
-ELBOW = PlanarArm.reduced(
-    inertia_star=(6.4e-4, 3.3e-5),
-    stiffness=3.0e-3,
-    damping=2.0e-5,
-    link_length=[0.2],
-    link_com=[0.1],
-    link_mass=[0.3],
-    link_inertia=[1e-3],
-    tip_mass=0.1,
-)
 BOX = UncertaintyBox()
 
 FRONT = {

@@ -14,8 +14,10 @@
 
 """Motions that start in the midst of another one."""
 
+from dataclasses import replace
+
+from core.conftest import ELBOW
 from flat_planner_ros.core import certified_plan, moving_start
-from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.cost import Strategy
 from flat_planner_ros.core.errors import UncertifiedPlan
 from flat_planner_ros.core.extremal import Jets
@@ -36,16 +38,7 @@ FINAL = (1.5, -0.5)
 @pytest.fixture
 def arm():
     """Return the paper's last two links on a first link."""
-    return PlanarArm.reduced(
-        inertia_star=(6.4e-4, 3.3e-5),
-        stiffness=3e-3,
-        damping=2e-5,
-        link_length=[0.2],
-        link_com=[0.1],
-        link_mass=[0.3],
-        link_inertia=[1e-3],
-        tip_mass=0.1,
-    )
+    return replace(ELBOW)
 
 
 def request_from(jets, duration=1.0):

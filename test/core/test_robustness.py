@@ -14,7 +14,7 @@
 
 """Predicted residual: against the simulated arm, and its largest value on the box's boundary."""
 
-from core.conftest import ARM, envelope
+from core.conftest import ARM, ELBOW, envelope
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.effort_profile import EffortProfile
 from flat_planner_ros.core.errors import InvalidRequest
@@ -74,21 +74,11 @@ def test_the_passive_joint_may_swing_at_the_start():
 
 
 def test_links_before_the_last_two_do_not_matter():
-    arm = PlanarArm.reduced(
-        inertia_star=(6.4e-4, 3.3e-5),
-        stiffness=3.0e-3,
-        damping=2.0e-5,
-        link_length=[0.2],
-        link_com=[0.1],
-        link_mass=[0.3],
-        link_inertia=[1e-3],
-        tip_mass=0.1,
-    )
     times, torque = bump(1.0)
-    oscillator = Oscillator.of(arm)
+    oscillator = Oscillator.of(ELBOW)
     poles = oscillator.poles(np.array([[0.9, 1.1]]))
     (predicted,) = residual_amplitude(oscillator, torque, 1.0, poles)
-    other = arm.scaled(stiffness=0.9, damping=1.1)
+    other = ELBOW.scaled(stiffness=0.9, damping=1.1)
     assert predicted == pytest.approx(
         simulated_amplitude(other, times, torque, motors=2), rel=1e-6
     )

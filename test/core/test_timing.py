@@ -34,6 +34,19 @@ import pytest
 EFFORT = 0.015
 """Limit of joint 1 [N m]."""
 
+LOADED = PlanarArm.reduced(
+    inertia_star=(0.04, 0.01),
+    stiffness=2.0,
+    damping=0.01,
+    link_length=[0.3],
+    link_com=[0.15],
+    link_mass=[1.0],
+    link_inertia=[0.01],
+    tip_mass=1.5,
+    gravity=9.81,
+)
+"""An arm whose weight the limits may not allow to be held or lifted."""
+
 
 def timing(limits, on_violation=OnViolation.REJECT, joints=('shoulder', 'elbow'), **changes):
     """Return rules."""
@@ -104,21 +117,9 @@ def test_a_duration_too_short_is_stretched_on_request(paper_arm):
 
 def test_to_stretch_is_not_to_shorten():
     # Only motions of 1.3 to 2.8 s lift this load; 5 s cannot be stretched to that.
-    arm = PlanarArm.reduced(
-        inertia_star=(0.04, 0.01),
-        stiffness=2.0,
-        damping=0.01,
-        link_length=[0.3],
-        link_com=[0.15],
-        link_mass=[1.0],
-        link_inertia=[0.01],
-        tip_mass=1.5,
-        gravity=9.81,
-    )
-
     def lift(duration):
         request = MotionRequest(start=[-1.5, 1.5, 0.0], final=[0.6, -0.6, 0.0], duration=duration)
-        return plan(request, arm, PlanningOptions(strategy=Strategy.POLYNOMIAL))
+        return plan(request, LOADED, PlanningOptions(strategy=Strategy.POLYNOMIAL))
 
     limits = JointLimits.of(3, effort=[5.6, inf, inf])
     joints = ('a', 'b', 'c')
@@ -133,21 +134,9 @@ def test_to_stretch_is_not_to_shorten():
 
 
 def test_a_static_load_is_named_as_such():
-    arm = PlanarArm.reduced(
-        inertia_star=(0.04, 0.01),
-        stiffness=2.0,
-        damping=0.01,
-        link_length=[0.3],
-        link_com=[0.15],
-        link_mass=[1.0],
-        link_inertia=[0.01],
-        tip_mass=1.5,
-        gravity=9.81,
-    )
-
     def lower(duration):
         request = MotionRequest(start=[pi / 2, 0.0, 0.0], final=[0.0, 0.0, 0.0], duration=duration)
-        return plan(request, arm, PlanningOptions())
+        return plan(request, LOADED, PlanningOptions())
 
     words = 'the effort of a at rest in the final pose is 5.886 N m'
     for duration in (None, 2.0):

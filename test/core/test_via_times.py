@@ -16,13 +16,13 @@
 
 from dataclasses import replace
 
+from core.conftest import ELBOW
 from flat_planner_ros.core import (
     EffortProfile,
     FlatModel,
     InvalidRequest,
     MotionRequest,
     plan,
-    PlanarArm,
     PlanningOptions,
     rollout,
     Strategy,
@@ -47,16 +47,7 @@ STRATEGIES = {
 @pytest.fixture
 def arm():
     """Return the paper's last two links on a first link."""
-    return PlanarArm.reduced(
-        inertia_star=(6.4e-4, 3.3e-5),
-        stiffness=3e-3,
-        damping=2e-5,
-        link_length=[0.2],
-        link_com=[0.1],
-        link_mass=[0.3],
-        link_inertia=[1e-3],
-        tip_mass=0.1,
-    )
+    return replace(ELBOW)
 
 
 REQUEST = MotionRequest(
