@@ -113,7 +113,7 @@ setup(
             'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.programs:make_urdf',
             'flat_plan = flat_planner_ros.programs:flat_plan',
-            'paper_table = flat_planner_ros.ros.paper_table:main',
+            'paper_table = flat_planner_ros.programs:paper_table',
             'tradeoff = flat_planner_ros.programs:tradeoff',
         ],
     },

@@ -81,6 +81,11 @@ def analyse() -> int:
     return _run_tool('analyse')
 
 
+def paper_table() -> int:
+    """Carry out the paper's experiment."""
+    return _run('paper_table', INTERRUPTED)
+
+
 def _run_tool(module: str) -> int:
     """Run a program that prints and ends; whoever reads it may stop reading, as `head` does."""
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)

@@ -80,7 +80,7 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
     """
     nodes: list[Node] = []
     is_open = is_ready = False
-    with _signals_caught() as interrupted:
+    with signals_caught() as interrupted:
         try:
             _refuse_strays(sys.argv if args is None else args)
             _init(args)
@@ -178,7 +178,7 @@ def _refuse_strays(args: Sequence[str]) -> None:
 
 
 @contextmanager
-def _signals_caught() -> Iterator[Event]:
+def signals_caught() -> Iterator[Event]:
     """
     Turn SIGINT and SIGTERM into an event, as often as they come.
 

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Sequence
 from subprocess import Popen
+from threading import Event
 from time import monotonic
 from typing import Any
 
@@ -85,6 +86,10 @@ class ExperimentFailed(Exception):
     """The experiment cannot go on; the message says why."""
 
 
+class Interrupted(Exception):
+    """SIGINT or SIGTERM has come."""
+
+
 class NotPlayed(Exception):
     """A run that a busy machine has spoilt."""
 
@@ -99,14 +104,17 @@ class Experimenter(Node):
         Simulated seconds per second.
     processes
         Those of the nodes; the experiment ends when one of them does.
+    interrupted
+        Ends it, too.
 
     """
 
-    def __init__(self, speed: float, processes: Sequence[Popen]) -> None:
+    def __init__(self, speed: float, processes: Sequence[Popen], interrupted: Event) -> None:
         """Open the topics and services of the three nodes."""
         super().__init__('paper_table')
         self._lead = LEAD * max(speed, 1.0)
         self._processes = processes
+        self._interrupted = interrupted
         self._states: list[JointState] = []
         self._plans: list[JointTrajectory] = []
         self._verdicts: list[DiagnosticArray] = []
@@ -280,6 +288,8 @@ class Experimenter(Node):
         """Spin until a condition holds; return whether it did before patience [s] ended."""
         deadline = monotonic() + patience
         while not condition():
+            if self._interrupted.is_set():
+                raise Interrupted
             if any(process.poll() is not None for process in self._processes):
                 raise ExperimentFailed('one of the three nodes has ended')
             if monotonic() > deadline:
@@ -288,7 +298,7 @@ class Experimenter(Node):
         return True
 
 
-def refuse_company() -> None:
+def refuse_company(interrupted: Event) -> None:
     """
     Make sure that none of our nodes is running: a goal would reach both.
 
@@ -296,12 +306,16 @@ def refuse_company() -> None:
     ------
     ExperimentFailed
         One is.
+    Interrupted
+        If the event is set meanwhile.
 
     """
     node = Node('paper_table_probe')
     deadline = monotonic() + DISCOVERY
     try:
         while monotonic() < deadline:
+            if interrupted.is_set():
+                raise Interrupted
             rclpy.spin_once(node, timeout_sec=0.1)
             present = sorted(set(OURS) & set(node.get_node_names()))
             if present:

@@ -24,11 +24,14 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+from threading import Event
 
 from flat_planner_ros.paper_example import BEYOND, CASES, Method, Result, Scenario
+from flat_planner_ros.ros.node_runner import signals_caught
 from flat_planner_ros.ros.paper_experiment import (
     Experimenter,
     ExperimentFailed,
+    Interrupted,
     refuse_company,
 )
 import rclpy
@@ -106,11 +109,10 @@ def main(args: Sequence[str] | None = None) -> int:
             return 1
     speed = 1.0 if options.real_time else SPEED
     try:
-        # Left to ROS, a signal would end the context in the middle of a call, which then fails.
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        refuse_company()
-        results = _results(speed, BEYOND if options.beyond else CASES)
+        with signals_caught() as interrupted:
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            refuse_company(interrupted)
+            results = _results(speed, BEYOND if options.beyond else CASES, interrupted)
         print(REMARKS, flush=True)
         if options.beyond:
             print(BEYOND_REMARKS, flush=True)
@@ -121,7 +123,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except (ExperimentFailed, OSError) as error:
         print(f'paper_table: {error}', file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
+    except Interrupted:
         print('interrupted', file=sys.stderr)
         return 130
     finally:
@@ -148,11 +150,13 @@ def _options(arguments: Sequence[str]) -> Namespace:
     return parser.parse_args(arguments)
 
 
-def _results(speed: float, cases: Sequence[tuple[Scenario, Method]]) -> list[Result]:
+def _results(
+    speed: float, cases: Sequence[tuple[Scenario, Method]], interrupted: Event
+) -> list[Result]:
     """Return the rows, printed as they come."""
     results = []
     with _node_processes(speed) as processes:
-        experimenter = Experimenter(speed, processes)
+        experimenter = Experimenter(speed, processes, interrupted)
         try:
             print('starting the three nodes ...', flush=True)
             experimenter.wait_for_nodes()
