@@ -157,12 +157,15 @@ class Graph:
 
     def close(self) -> None:
         """Destroy everything, whatever state it is in."""
-        for process in self._processes:
-            process.close()
-        self.executor.shutdown(0.0)
-        for node in reversed(self._nodes):
-            node.destroy_node()
-        self.context.try_shutdown()
+        try:
+            self.executor.shutdown(0.0)
+            for node in reversed(self._nodes):
+                node.destroy_node()
+            self.context.try_shutdown()
+        finally:
+            # Last: taking leave of a peer that has just been killed may crash the middleware.
+            for process in self._processes:
+                process.close()
 
     def add(self, node: Node) -> Node:
         """Spin a node with the others and destroy it at the end."""
