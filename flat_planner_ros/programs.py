@@ -97,13 +97,13 @@ def _run(module: str, interrupted: int = 0) -> int:
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         # No exception: it would come up in the middle of an import, where some libraries turn it
-        # into another one. There is nothing to be cleaned up yet.
+        # into another one. There is nothing to be cleaned up yet, or nothing any more.
         os._exit(interrupted)
 
     for number in SIGNALS:
         signal.signal(number, leave)
     try:
-        # From here on, while the nodes exist, the module catches signals by itself.
+        # A module with nodes catches signals by itself from here on, while they exist.
         return int(import_module(f'flat_planner_ros.ros.{module}').main())
     finally:
         # A late signal must not spoil the exit code while the interpreter is taken down.

@@ -26,6 +26,7 @@ from threading import Event
 from typing import Any
 
 from flat_planner_ros.core import FlatPlannerError
+from flat_planner_ros.programs import SIGNALS
 import rclpy
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
@@ -185,7 +186,7 @@ def signals_caught() -> Iterator[Event]:
     Left to ROS, a signal would end the context in the middle of a callback, which then fails.
     """
     interrupted = Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.getsignal(number) for number in SIGNALS}
 
     for number in before:
         signal.signal(number, lambda *_: interrupted.set())

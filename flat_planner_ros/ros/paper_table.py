@@ -18,7 +18,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import csv
-import ctypes
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 import signal
@@ -26,7 +26,9 @@ import subprocess
 import sys
 from threading import Event
 
+from flat_planner_ros.child_process import end_with_parent
 from flat_planner_ros.paper_example import BEYOND, CASES, Method, Result, Scenario
+from flat_planner_ros.programs import INTERRUPTED
 from flat_planner_ros.ros.node_runner import signals_caught
 from flat_planner_ros.ros.paper_experiment import (
     Experimenter,
@@ -46,9 +48,6 @@ WINDOW = 3.0
 
 SILENCE = 5.0
 """Real time for which a busy machine may be silent [s]."""
-
-PR_SET_PDEATHSIG = 1
-"""Option of prctl(2): the signal that a process gets when its parent ends."""
 
 TERMINATION = 5.0
 """Time that a node is given to end by itself [s]."""
@@ -125,7 +124,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return 1
     except Interrupted:
         print('interrupted', file=sys.stderr)
-        return 130
+        return INTERRUPTED
     finally:
         rclpy.try_shutdown()
     return 0
@@ -197,7 +196,11 @@ def _node_processes(speed: float) -> Iterator[list[subprocess.Popen]]:
                 command += ['-p', f'{name}:={value}']
             # Its own session: Ctrl-C reaches this process alone, which ends the nodes in order.
             processes.append(
-                subprocess.Popen(command, start_new_session=True, preexec_fn=_end_with_parent)
+                subprocess.Popen(
+                    command,
+                    start_new_session=True,
+                    preexec_fn=partial(end_with_parent, signal.SIGTERM),
+                )
             )
         yield processes
     finally:
@@ -208,11 +211,6 @@ def _node_processes(speed: float) -> Iterator[list[subprocess.Popen]]:
                 process.wait(TERMINATION)
             except subprocess.TimeoutExpired:
                 process.kill()
-
-
-def _end_with_parent() -> None:
-    """Have Linux terminate this process with its parent, even if that is killed."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _row(result: Result) -> str:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-import ctypes
+from functools import partial
 import os
 from pathlib import Path
 import signal
@@ -30,6 +30,7 @@ from time import monotonic
 from typing import Any
 
 import flat_planner_ros
+from flat_planner_ros.child_process import end_with_parent
 import pytest
 
 with suppress(ImportError):  # without ROS every test here is skipped (test/conftest.py)
@@ -49,12 +50,6 @@ DOMAINS = range(50, 100)
 
 LOCK_PORT = 24100
 """First of the local TCP ports, one per domain, that keep a domain to one process of tests."""
-
-LIBC = ctypes.CDLL(None)
-"""Loaded here: between fork and exec nothing may be loaded that other threads load, too."""
-
-PR_SET_PDEATHSIG = 1
-"""Option of prctl(2): the signal that a process gets when its parent ends."""
 
 POLL = 0.02
 """Longest wait between two looks at a condition [s]."""
@@ -83,7 +78,7 @@ class Process:
             stdout=self._out,
             stderr=self._err,
             start_new_session=True,
-            preexec_fn=_end_with_parent,
+            preexec_fn=partial(end_with_parent, signal.SIGKILL),
         )
 
     @property
@@ -345,11 +340,6 @@ def graph(ros_domain: int) -> Iterator[Graph]:
         yield graph
     finally:
         graph.close()
-
-
-def _end_with_parent() -> None:
-    """Have Linux kill this process with its parent: nothing is left in the way of other tests."""
-    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _parameters(values: Mapping[str, Any]) -> list[Parameter]:

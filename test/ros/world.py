@@ -38,6 +38,9 @@ ANSWERS = ('ACCEPTED', 'REJECTED')
 START_DELAY = 0.5
 """Time between a verdict and the motion [s]; a busy machine may need it to hand over a command."""
 
+LATE = ('ms after its start', 'skipped to keep up', 'trajectory ignored')
+"""What the plant says of commands that it could not play as they were planned."""
+
 NOT_YET = ('START_STATE_UNKNOWN', 'START_STATE_STALE', 'NOT_AT_REST')
 
 
@@ -200,8 +203,7 @@ class World(Observer):
 
     def is_said_to_be_late(self):
         """Return whether the plant has said that it could not play the motion in time."""
-        words = ('ms after its start', 'skipped to keep up', 'trajectory ignored')
-        return any(self.graph.logged(word) for word in words)
+        return any(self.graph.logged(word) for word in LATE)
 
     def assert_next_goal_works(self, position):
         """Move and look at where the arm comes to rest."""

@@ -26,7 +26,18 @@ import numpy as np
 from rclpy.qos import QoSProfile
 from ros.conftest import Graph
 from ros.relay import Faults, Relay
-from ros.world import answers, COMMAND, EVERY_VERDICT, goal, NODES, REPORT, stamp, STATUS, values
+from ros.world import (
+    answers,
+    COMMAND,
+    EVERY_VERDICT,
+    goal,
+    LATE,
+    NODES,
+    REPORT,
+    stamp,
+    STATUS,
+    values,
+)
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -54,8 +65,8 @@ less than 1.8 standard deviations; three and more are rare.
 UNEVEN = Faults(loss=0.1, duplication=0.3, delay=(0.0, 0.2))
 """What goes wrong between the nodes in an episode of bad transport."""
 
-LATE = ('ms after its start', 'skipped to keep up', 'trajectory ignored', 'set back')
-"""What the plant says of commands that it could not play as they were planned."""
+DISTURBED = (*LATE, 'set back')
+"""What the plant says of commands that it could not play, or not with that clock."""
 
 DEADLINE = 60.0
 """Time within which anything must happen [s]."""
@@ -232,7 +243,7 @@ class Rig:
     def _judge(self, kind: str, verdict: dict[str, str], report: dict[str, str]) -> None:
         """Compare what was left with what had to be."""
         self.counts['motions reported'] += 1
-        if any(self.graph.logged(word) for word in LATE):
+        if any(self.graph.logged(word) for word in DISTURBED):
             self.counts['motions late or refused, said by the plant'] += 1
             return
         if kind == 'transport' and len(self.commands.delivered) < len(self.commands.received):
