@@ -53,7 +53,7 @@ test: lint  ## ruff, mypy and all tests
 fuzz: export FUZZ_CASES ?= 100000
 fuzz: export RANDOM_MESSAGES ?= 10000
 fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
-	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/test_random_messages.py $(ARGS)
+	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/wire/test_random_messages.py $(ARGS)
 
 soak: export PYTHONUNBUFFERED := 1
 soak: install  ## random motions with faults for a long time, MINUTES=30 by default

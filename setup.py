@@ -26,7 +26,7 @@ setup(
     maintainer_email='flat-planner-ros@users.noreply.github.com',
     license='Apache-2.0',
     packages=find_packages(include=[package_name, f'{package_name}.*']),
-    package_data={package_name: ['live/page/*']},
+    package_data={package_name: ['ros/live_view/page/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

@@ -21,10 +21,8 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core import (
-    extrema_of,
     JointLimits,
     MotionRequest,
-    NoFeasibleDuration,
     Plan,
     plan,
     PlanarArm,
@@ -32,6 +30,7 @@ from flat_planner_ros.core import (
     shortest_plan,
     Strategy,
 )
+from flat_planner_ros.core.planning import extrema_of, NoFeasibleDuration
 from measurement import duration_text, Section, timing, verdict
 import numpy as np
 import problem

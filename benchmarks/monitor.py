@@ -17,7 +17,7 @@
 from argparse import Namespace
 from time import time
 
-from flat_planner_ros.ros import interfaces
+from flat_planner_ros.ros.wire import interfaces
 from measurement import Section, verdict
 from plant import COMMAND, RATE, trajectory
 from processes import executors, listener, NodeProcess, processes, SHIPPED, SINGLE

@@ -20,10 +20,10 @@ from math import pi
 from time import perf_counter
 from typing import Any
 
-from flat_planner_ros.core import Goal, GoalPoint, Motion, plan
-from flat_planner_ros.core.timeline import Timeline
-from flat_planner_ros.ros import conversions, diagnostics, interfaces
-from flat_planner_ros.ros.planner_node import PlannerNode
+from flat_planner_ros.core import Goal, GoalPoint, plan
+from flat_planner_ros.core.session import Motion, Timeline
+from flat_planner_ros.ros.nodes.planner_node import PlannerNode
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
 from measurement import duration_text, Section, Timing, timing, verdict
 import problem
 from processes import PATIENCE

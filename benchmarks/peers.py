@@ -23,7 +23,8 @@ from collections.abc import Callable
 from math import comb
 from typing import NamedTuple
 
-from flat_planner_ros.core import flat_map, strategy_cost
+from flat_planner_ros.core.arm import flat_map
+from flat_planner_ros.core.motion_law import strategy_cost
 import legendre
 import numpy as np
 from numpy.polynomial import polynomial

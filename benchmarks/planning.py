@@ -20,14 +20,7 @@ from itertools import count
 from typing import NamedTuple
 import warnings
 
-from flat_planner_ros.core import (
-    MotionRequest,
-    Plan,
-    plan,
-    PlanarArm,
-    PlanningOptions,
-    Strategy,
-)
+from flat_planner_ros.core import MotionRequest, Plan, plan, PlanarArm, PlanningOptions, Strategy
 from measurement import duration_text, Section, Timing, timing, verdict
 import numpy as np
 from peers import Peer, PEERS, Solver

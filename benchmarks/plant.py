@@ -19,14 +19,12 @@ from pathlib import Path
 from time import monotonic, time
 from typing import NamedTuple
 
-from flat_planner_ros.core import MotionRequest, plan, PlanSamples
-from flat_planner_ros.ros import (
-    conversions,
-    interfaces,
-    planner_parameters,
-    plant_parameters,
-)
-from flat_planner_ros.ros.parameter_file import read_settings
+from flat_planner_ros.core import MotionRequest, plan
+from flat_planner_ros.core.planning import PlanSamples
+from flat_planner_ros.ros.parameters import planner as planner_parameters
+from flat_planner_ros.ros.parameters import plant as plant_parameters
+from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.wire import conversions, interfaces
 from measurement import Section, verdict
 import numpy as np
 import problem

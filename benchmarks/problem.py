@@ -19,14 +19,8 @@ from math import pi
 from pathlib import Path
 from typing import NamedTuple
 
-from flat_planner_ros.core import (
-    flat_map,
-    FlatModel,
-    MotionRequest,
-    PlanarArm,
-    PlanningOptions,
-    Strategy,
-)
+from flat_planner_ros.core import FlatModel, MotionRequest, PlanarArm, PlanningOptions, Strategy
+from flat_planner_ros.core.arm import flat_map
 import numpy as np
 from numpy.typing import NDArray
 

@@ -80,7 +80,7 @@ class NodeProcess:
         self, name: str, executor: str, parameters: dict[str, str], file: Path | None = None
     ) -> None:
         """Start it."""
-        program = ['-m', f'flat_planner_ros.ros.{name}_node']
+        program = ['-m', f'flat_planner_ros.ros.nodes.{name}_node']
         if executor != SHIPPED:
             program = [str(Path(__file__).parent / 'spin_node.py'), name, executor]
         values = [f'{key}:={value}' for key, value in parameters.items()]

@@ -26,7 +26,7 @@ def main() -> None:
     """Spin until the process is asked to end."""
     name, executor_name, *arguments = sys.argv[1:]
     rclpy.init(args=[sys.argv[0], *arguments])
-    module = import_module(f'flat_planner_ros.ros.{name}_node')
+    module = import_module(f'flat_planner_ros.ros.nodes.{name}_node')
     node = getattr(module, f'{name.capitalize()}Node')()
     executor = new_executor(executor_name)
     executor.add_node(node)

@@ -19,7 +19,7 @@ import subprocess
 import sys
 from time import perf_counter
 
-from flat_planner_ros.ros import interfaces
+from flat_planner_ros.ros.wire import interfaces
 from measurement import duration_text, Section, Timing
 from processes import listener, NodeProcess, processes, SHIPPED
 from std_srvs.srv import Trigger
@@ -84,6 +84,6 @@ def _start(node: str) -> float:
 
 def _heavy(node: str) -> list[str]:
     """Return the heavy modules that a node's module imports."""
-    code = f'import sys, flat_planner_ros.ros.{node}_node; print(*sys.modules)'
+    code = f'import sys, flat_planner_ros.ros.nodes.{node}_node; print(*sys.modules)'
     run = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True, text=True)
     return [name for name in HEAVY if name in run.stdout.split()]

@@ -20,8 +20,16 @@ from pathlib import Path
 import re
 import sys
 
-from flat_planner_ros.ros import monitor_parameters, planner_parameters, plant_parameters
-from flat_planner_ros.ros.parameters import model_rows, Row
+from flat_planner_ros.ros.parameters import (
+    monitor as monitor_parameters,
+)
+from flat_planner_ros.ros.parameters import (
+    planner as planner_parameters,
+)
+from flat_planner_ros.ros.parameters import (
+    plant as plant_parameters,
+)
+from flat_planner_ros.ros.parameters.declaration import model_rows, Row
 
 PAGE = Path(__file__).resolve().parent / 'interfaces.md'
 """The page with the tables."""

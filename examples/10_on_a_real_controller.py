@@ -26,9 +26,9 @@ from pathlib import Path
 import sys
 
 from flat_planner_ros.core import Goal, GoalPoint, PlannerSession, StartSource
-from flat_planner_ros.ros.conversions import command_bytes
-from flat_planner_ros.ros.parameter_file import read_settings
-from flat_planner_ros.ros.planner_parameters import build, ROWS
+from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.parameters.planner import build, ROWS
+from flat_planner_ros.ros.wire.conversions import command_bytes
 from matplotlib import pyplot as plt
 from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory

@@ -33,57 +33,57 @@ INTERRUPTED = 130
 
 def planner_node() -> int:
     """Run the planner node."""
-    return _run('planner_node')
+    return _run('nodes.planner_node')
 
 
 def plant_node() -> int:
     """Run the plant node."""
-    return _run('plant_node')
+    return _run('nodes.plant_node')
 
 
 def monitor_node() -> int:
     """Run the monitor node."""
-    return _run('monitor_node')
+    return _run('nodes.monitor_node')
 
 
 def demo() -> int:
     """Run the three nodes."""
-    return _run('demo')
+    return _run('programs.demo')
 
 
 def record() -> int:
     """Record the graph."""
-    return _run('record')
+    return _run('programs.record')
 
 
 def live_view() -> int:
     """Show the graph in web browsers."""
-    return _run('live_view')
+    return _run('programs.live_view')
 
 
 def flat_plan() -> int:
     """Plan on the command line."""
-    return _run_tool('flat_plan')
+    return _run_tool('programs.flat_plan')
 
 
 def tradeoff() -> int:
     """Show effort against residual."""
-    return _run_tool('tradeoff')
+    return _run_tool('programs.tradeoff')
 
 
 def make_urdf() -> int:
     """Write a robot description."""
-    return _run_tool('make_urdf')
+    return _run_tool('programs.make_urdf')
 
 
 def analyse() -> int:
     """Judge a recording."""
-    return _run_tool('analyse')
+    return _run_tool('programs.analyse')
 
 
 def paper_table() -> int:
     """Carry out the paper's experiment."""
-    return _run('paper_table', INTERRUPTED)
+    return _run('programs.paper_table', INTERRUPTED)
 
 
 def _run_tool(module: str) -> int:

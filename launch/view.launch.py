@@ -15,7 +15,7 @@
 """The arm and a ghost of its plan: robot descriptions, their transforms and, on demand, RViz."""
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
-from flat_planner_ros.ros.robot_description import read_urdf
+from flat_planner_ros.ros.programs.robot_description import read_urdf
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution

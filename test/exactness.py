@@ -25,11 +25,13 @@ from math import log10, perm
 from typing import NamedTuple
 import warnings
 
-from flat_planner_ros.core.arm import PlanarArm
-from flat_planner_ros.core.cost import QuadraticCost, Strategy
-from flat_planner_ros.core.errors import UncertifiedPlan
-from flat_planner_ros.core.flatness import FlatModel
-from flat_planner_ros.core.planning import MotionRequest, Plan, plan, PlanningOptions
+from flat_planner_ros.core.arm.errors import UncertifiedPlan
+from flat_planner_ros.core.arm.flat_map import FlatModel
+from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy
+from flat_planner_ros.core.planning.plan import Plan
+from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
 from numpy.polynomial import Polynomial
 import oracle

@@ -28,97 +28,40 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 PACKAGE = CHECKOUT / 'flat_planner_ros'
 CORE = PACKAGE / 'core'
 ROS = PACKAGE / 'ros'
-CORE_MODULES = sorted(p.stem for p in CORE.glob('*.py') if p.stem != '__init__')
+CORE_FILES = sorted(CORE.rglob('*.py'))
+SOURCES = [p for p in sorted(PACKAGE.rglob('*.py')) if p != CORE / '__init__.py']
 ROS_FILES = sorted(ROS.rglob('*.py'))
-NODES = sorted(ROS.glob('*_node.py'))
+NODES = sorted(ROS.glob('nodes/*_node.py'))
 
-MAY_IMPORT = {
-    'errors': '',
-    'links': 'errors',
-    'stacks': '',
-    'arm': 'links stacks errors',
-    'counterbalance': 'links errors',
-    'link_bodies': 'links errors',
-    # the plant
-    'interpolation': '',
-    'effort_profile': 'interpolation errors',
-    'drives': 'effort_profile arm errors',
-    'simulation': 'drives effort_profile arm errors',
-    'rollout': 'simulation effort_profile arm errors',
-    'sensing': 'simulation errors',
-    'simulation_settings': 'sensing simulation arm errors',
-    'troubles': 'simulation errors',
-    'pacing': 'simulation_settings troubles sensing simulation effort_profile arm errors',
-    # the monitor
-    'oscillation_search': 'errors',
-    'oscillation': 'oscillation_search errors',
-    'motion_record': 'interpolation errors',
-    'identification': 'oscillation oscillation_search arm errors',
-    'adoption': 'identification arm errors',
-    'vibration_report': 'identification arm oscillation errors',
-    'assessment': 'identification motion_record oscillation vibration_report errors',
-    'vibration': 'assessment motion_record oscillation vibration_report errors',
-    # the planner
-    'flatness': 'arm errors',
-    'cost': 'flatness arm errors',
-    'roots': 'errors',
-    'modes': 'errors',
-    'motion_law': 'modes errors',
-    'solutions': 'modes roots errors',
-    'extremal': 'solutions motion_law modes roots errors',
-    'quadrature': 'motion_law modes errors',
-    'unit_motion': 'quadrature extremal solutions motion_law modes errors',
-    'robustness': 'arm errors',
-    'insensitivity': 'robustness arm errors',
-    'shaping': 'arm errors',
-    'tradeoff': 'planning plan_samples shaping insensitivity robustness cost arm errors',
-    'momentum': 'flatness arm errors',
-    'insensitive': 'insensitivity momentum robustness flatness arm errors',
-    'shaped_course': 'insensitive insensitivity course task solutions motion_law errors',
-    'plan_samples': 'flatness arm errors',
-    'rejection': 'errors',
-    'goal': 'rejection',
-    'timeline': 'limits certified_plan plan_samples cost',
-    'stopping': 'limits planning extremal solutions errors',
-    'extrema': 'certified_plan plan_samples solutions',
-    'limits': 'extrema certified_plan errors',
-    'duration': 'limits extrema certified_plan errors',
-    'timing': 'duration limits extrema certified_plan rejection',
-    'session_settings': 'timing limits request rejection arm errors',
-    'rest_start': 'session_settings motion_record rejection',
-    'takeover': 'session_settings timeline motion_record solutions rejection',
-    'answer': 'takeover session_settings timing via_times planning request goal rejection errors',
-    'session': 'answer rest_start takeover session_settings stopping timeline plan_samples goal '
-    'rejection motion_record',
-    'request': 'insensitivity solutions cost flatness errors',
-    'task': 'request unit_motion solutions cost flatness arm errors',
-    'course': 'task unit_motion quadrature solutions motion_law flatness',
-    'moving_start': 'task unit_motion extremal solutions motion_law',
-    # motions through via points
-    'segment_basis': 'solutions roots modes',
-    'coupling': 'segment_basis solutions errors',
-    'piecewise_law': 'motion_law',
-    'via_points': 'coupling segment_basis piecewise_law moving_start unit_motion extremal '
-    'solutions motion_law cost errors',
-    'via_times': 'via_points task request solutions cost arm errors',
-    'certified_plan': 'course task request plan_samples cost flatness errors',
-    'planning': 'certified_plan via_times via_points shaped_course moving_start course task '
-    'request plan_samples cost flatness arm errors',
+WINGS = {
+    'arm': '',
+    'motion_law': 'arm',
+    'insensitive': 'arm',
+    'planning': 'motion_law insensitive arm',
+    'session': 'planning arm',
+    'plant': 'arm',
+    'monitor': 'arm',
 }
-"""The modules of the core, each with the others that it may import; a new one is added here."""
+"""The wings of the core, each with the others from whose public lists it may import."""
 
 MESSAGES_ALLOWED = {
     'conversions.py': 'the one place for messages and core types',
     'diagnostics.py': 'the same for verdicts and reports',
     '*_node.py': 'the types of its topics and services',
     'model_adoption.py': 'hears reports and answers a service for the planner node',
-    'parameters.py': 'descriptors and verdicts of parameters, from rcl_interfaces',
+    'declaration.py': 'descriptors and verdicts of parameters, from rcl_interfaces',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
 }
 """Patterns of the files that import message packages, each with its reason."""
 
 WITH_RCLPY = {'builtin_interfaces', 'rcl_interfaces'}
 """Message packages that the wheel of rclpy brings along."""
+
+
+def module_name(path: Path) -> str:
+    """Return the dotted name of a file of the package, without the suffix of a package."""
+    return '.'.join(path.relative_to(CHECKOUT).with_suffix('').parts).removesuffix('.__init__')
+
 
 NEVER = ('rclpy', 'matplotlib')
 """What importing the core must not need."""
@@ -127,8 +70,8 @@ PROBE = f"""
 import importlib, os, sys
 sys.modules.update(dict.fromkeys({NEVER}))  # any import of them raises ImportError
 before = set(sys.modules)
-for name in {['', *(f'.{module}' for module in CORE_MODULES)]}:
-    importlib.import_module('flat_planner_ros.core' + name)
+for name in {[module_name(path) for path in CORE_FILES]}:
+    importlib.import_module(name)
 allowed = sys.stdlib_module_names | {{'numpy', 'scipy', 'flat_planner_ros'}}
 libraries = [sys.modules[name].__file__ for name in ('numpy', 'scipy') if name in sys.modules]
 homes = tuple(map(os.path.dirname, libraries))  # of compiled modules with names of their own
@@ -172,15 +115,25 @@ def is_ros(name: str) -> bool:
     return is_message_package(name) or name.startswith(('rclpy', 'rcl_', 'ament_', 'launch'))
 
 
-def core_imports(module: str) -> set[str]:
-    """Return the other modules of the core that one of them imports."""
-    prefix = 'flat_planner_ros.core.'
-    names = {
-        n.removeprefix(prefix).partition('.')[0]
-        for n in imports(CORE / f'{module}.py')
-        if n.startswith(prefix)
-    }
-    return (names & set(CORE_MODULES)) - {module}
+@cache
+def imported_names(path: Path) -> list[tuple[str, set[str]]]:
+    """Return what a file imports from other modules of the package, by module."""
+    nodes = ast.walk(ast.parse(path.read_text('utf-8')))
+    found = [n for n in nodes if isinstance(n, ast.ImportFrom) and n.module]
+    return [(n.module, {alias.name for alias in n.names}) for n in found]
+
+
+@cache
+def public_list(wing: str) -> tuple[str, ...]:
+    """Return the names in `__all__` of a wing, or of the front door ('')."""
+    tree = ast.parse((CORE / wing / '__init__.py').read_text('utf-8'))
+    return tuple(ast.literal_eval(tree.body[-1].value))
+
+
+def wing(module: str) -> str:
+    """Return the wing of the core that a module is or belongs to; '' for anything else."""
+    parts = module.split('.')
+    return parts[2] if parts[:2] == ['flat_planner_ros', 'core'] and len(parts) > 2 else ''
 
 
 @cache
@@ -224,42 +177,46 @@ def test_core_needs_only_numpy_and_scipy():
 
 def test_only_the_ros_layer_imports_ros():
     others = [p for p in PACKAGE.rglob('*.py') if p not in ROS_FILES]
-    assert len(others) > len(CORE_MODULES)
+    assert len(others) > len(CORE_FILES)
     assert {p.name: found for p in others if (found := set(filter(is_ros, roots(p))))} == {}
 
 
-def test_the_core_does_not_import_the_ros_layer():
-    for module in CORE_MODULES:
-        names = imports(CORE / f'{module}.py')
-        assert not [n for n in names if n.startswith('flat_planner_ros.ros')], module
+def test_the_core_does_not_import_the_rest_of_the_package():
+    for path in CORE_FILES:
+        ours = {n for n in imports(path) if n.startswith('flat_planner_ros.')}
+        assert all(n.startswith('flat_planner_ros.core.') for n in ours), path
 
 
-def test_the_ros_layer_uses_the_public_list_of_the_core():
-    private = {f'flat_planner_ros.core.{module}' for module in CORE_MODULES}
-    assert {p.name: found for p in ROS_FILES if (found := imports(p) & private)} == {}
+def test_every_wing_has_its_row():
+    assert {path.name for path in CORE.iterdir() if path.is_dir() and path.name[0] != '_'} == set(
+        WINGS
+    )
 
 
-def test_core_modules_do_not_import_through_the_public_list():
-    public = 'flat_planner_ros.core'
-    assert [m for m in CORE_MODULES if public in imports(CORE / f'{m}.py')] == []
+@pytest.mark.parametrize('name', WINGS)
+def test_wings_import_in_one_direction(name):
+    used = {wing(n) for path in (CORE / name).glob('*.py') for n in imports(path)}
+    assert used - {name, ''} <= set(WINGS[name].split())
 
 
-def test_every_core_module_has_its_place():
-    assert set(CORE_MODULES) <= set(MAY_IMPORT)
+@pytest.mark.parametrize('path', SOURCES, ids=module_name)
+def test_wings_are_entered_by_their_public_lists(path):
+    """Every name of another wing comes from its list, and the front door is for users alone."""
+    own = wing(module_name(path))
+    for module, names in imported_names(path):
+        if module == 'flat_planner_ros.core':
+            raise AssertionError(f'{path} uses the front door')
+        if wing(module) not in ('', own):
+            assert module.count('.') == 2, f'{path} goes past the list of {module}'
+            assert names <= set(public_list(wing(module))), module
 
 
-@pytest.mark.parametrize('module', CORE_MODULES)
-def test_core_modules_import_in_one_direction(module):
-    assert core_imports(module) <= set(MAY_IMPORT.get(module, '').split())
+def test_the_front_door_is_small():
+    assert len(public_list('')) <= 30
 
 
-def test_plant_and_monitor_know_nothing_of_planning():
-    def reach(module: str) -> set[str]:
-        return {module}.union(*map(reach, MAY_IMPORT[module].split()))
-
-    planner = {'flatness', 'cost', 'roots', 'extremal', 'motion_law', 'planning'}
-    for module in ('simulation', 'oscillation', 'vibration'):
-        assert not planner & reach(module)
+def test_plant_and_monitor_know_nothing_of_planning_nor_of_each_other():
+    assert WINGS['plant'] == WINGS['monitor'] == 'arm'
 
 
 @pytest.mark.parametrize('node', NODES, ids=lambda path: path.stem)

@@ -17,7 +17,7 @@
 import json
 from math import inf, nan
 
-from flat_planner_ros.live.feed import Cursor, Feed, HISTORY
+from flat_planner_ros.ros.live_view.feed import Cursor, Feed, HISTORY
 
 
 def test_each_browser_is_told_everything_once():

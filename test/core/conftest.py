@@ -17,7 +17,7 @@
 from dataclasses import replace
 from types import ModuleType
 
-from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.arm.planar_arm import PlanarArm
 import numpy as np
 import pytest
 

@@ -207,7 +207,8 @@ class Graph:
 
     def start(self, module: str, *arguments: str, **environment: str) -> Process:
         """Start a module of our ROS layer, e.g. 'plant_node', as a process on the same graph."""
-        name = f'flat_planner_ros.ros.{module}'
+        wing = 'nodes' if module.endswith('_node') else 'programs'
+        name = f'flat_planner_ros.ros.{wing}.{module}'
         return self.run([sys.executable, '-m', name, *arguments], **environment)
 
     def run(self, command: Sequence[str], **environment: str) -> Process:

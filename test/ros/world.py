@@ -17,10 +17,10 @@
 from time import monotonic
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros import conversions, interfaces
-from flat_planner_ros.ros.monitor_node import MonitorNode
-from flat_planner_ros.ros.planner_node import PlannerNode
-from flat_planner_ros.ros.plant_node import PlantNode
+from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
+from flat_planner_ros.ros.nodes.planner_node import PlannerNode
+from flat_planner_ros.ros.nodes.plant_node import PlantNode
+from flat_planner_ros.ros.wire import conversions, interfaces
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile

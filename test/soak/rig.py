@@ -21,7 +21,7 @@ from pathlib import Path
 from time import monotonic, time
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros import interfaces
+from flat_planner_ros.ros.wire import interfaces
 import numpy as np
 from rclpy.qos import QoSProfile
 from ros.conftest import Graph

@@ -1,0 +1,77 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Arm: the model. Links, dynamics, counterbalances, flat map; its errors and measured samples."""
+
+from flat_planner_ros.core.arm.counterbalance import (
+    Counterbalances,
+    counterbalances,
+    displaced_com,
+    remedy,
+)
+from flat_planner_ros.core.arm.errors import (
+    FlatPlannerError,
+    InvalidCommand,
+    InvalidCost,
+    InvalidModel,
+    InvalidRequest,
+    NotFlat,
+    OutOfReach,
+    strict_arithmetic,
+    UncertifiedPlan,
+)
+from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
+from flat_planner_ros.core.arm.joint_sample import JointSample
+from flat_planner_ros.core.arm.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
+from flat_planner_ros.core.arm.planar_arm import NaturalMode, PlanarArm
+from flat_planner_ros.core.arm.sampled_motion import SampledMotion
+from flat_planner_ros.core.arm.urdf import (
+    ArmDescription,
+    ControlBlock,
+    PLUGINS,
+    urdf_of,
+    UrdfLimits,
+)
+
+__all__ = [
+    'apply_row',
+    'ArmDescription',
+    'bodies_of_constants',
+    'bodies_of_links',
+    'ControlBlock',
+    'Counterbalances',
+    'counterbalances',
+    'displaced_com',
+    'flat_map',
+    'FlatMap',
+    'FlatModel',
+    'FlatPlannerError',
+    'InvalidCommand',
+    'InvalidCost',
+    'InvalidModel',
+    'InvalidRequest',
+    'JointSample',
+    'LinkBody',
+    'NaturalMode',
+    'NotFlat',
+    'OutOfReach',
+    'PlanarArm',
+    'PLUGINS',
+    'remedy',
+    'SampledMotion',
+    'strict_arithmetic',
+    'UncertifiedPlan',
+    'urdf_of',
+    'UrdfLimits',
+]

@@ -1,0 +1,48 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Insensitivity: the residual on arms other than the model, and laws that keep it small."""
+
+from flat_planner_ros.core.insensitive.law import least_effort, rehearse, shaped_motion
+from flat_planner_ros.core.insensitive.residual import (
+    MAX_HALF_WIDTH,
+    predict_residual,
+    PredictedResidual,
+    UncertaintyBox,
+)
+from flat_planner_ros.core.insensitive.settings import (
+    Criterion,
+    DEFAULT_WEIGHT,
+    Insensitivity,
+    MAX_INSENSITIVITY,
+    Nominal,
+)
+from flat_planner_ros.core.insensitive.shapers import shaped_quintic, Shaper
+
+__all__ = [
+    'Criterion',
+    'DEFAULT_WEIGHT',
+    'Insensitivity',
+    'least_effort',
+    'MAX_HALF_WIDTH',
+    'MAX_INSENSITIVITY',
+    'Nominal',
+    'predict_residual',
+    'PredictedResidual',
+    'rehearse',
+    'shaped_motion',
+    'shaped_quintic',
+    'Shaper',
+    'UncertaintyBox',
+]

@@ -1,0 +1,276 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Momentum angle: laws of the planned variable that are shaped by their effort.
+
+The momentum angle sigma is the angle that the last two links would have if they were one rigid
+body: I*_(n-1) sigma'' = tau, whatever the spring does ((I4) of docs/derivation.md). Any torque is
+therefore a sigma, expanded here in Legendre polynomials, and the planned variable w answers to it
+like an oscillator: w + delta w' + w'' / omega^2 = sigma.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import ceil
+
+from flat_planner_ros.core.arm import FlatMap
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+CONTACT = 3
+"""
+Derivatives of sigma that vanish at both ends.
+
+Then the effort and its rate are zero there, and five derivatives of w at the start: with no
+oscillation left, these are the twelve conditions of the other strategies.
+"""
+
+TOP = CONTACT + 1
+"""Derivative of sigma in which laws are expanded."""
+
+JET_ORDER = 6
+"""Highest derivative of w that joint motions and the flat plan need."""
+
+SPLIT_TURN = 1.5
+"""
+Half the turn of the natural oscillation per term of sigma^(4) from which it is a mode of its own.
+
+Below, a polynomial resolves it to double precision; above, the series of the particular solution
+in derivatives of sigma converges fast [rad].
+"""
+
+TERMS_PER_TURN = 1.4
+"""Legendre terms that resolve one radian of half the turn, a little above e / 2 [1/rad]."""
+
+SPARE_TERMS = 20
+"""Terms beyond those, after which the coefficients have decayed below roundoff."""
+
+BASES_KEPT = 8
+"""Bases of different size that are remembered."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MomentumBasis:
+    """
+    All momentum angles from -1/2 to 1/2 within a space of polynomials, x in [-1, 1].
+
+    The law with coefficients c has sigma^(4) = `start` + `directions` @ c, and the integral of
+    sigma''^2 is `least` + c @ c.
+
+    Attributes
+    ----------
+    start
+        Legendre coefficients of sigma^(4) of the law of least effort in the space, shape (m,).
+    directions
+        Those of changes, whose sigma'' are orthonormal, shape (m, modes).
+    torque_start, torque_directions
+        Legendre coefficients of sigma'' of both, shapes (m + 2,) and (m + 2, modes).
+    least
+        Integral of sigma''^2 of `start`.
+
+    """
+
+    start: FloatArray
+    directions: FloatArray
+    torque_start: FloatArray
+    torque_directions: FloatArray
+    least: float
+
+
+LEAST_OF_ALL = 1.5
+"""Integral of sigma''^2 of a linear sigma'', the least of any motion from -1/2 to 1/2."""
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def momentum_basis(modes: int) -> MomentumBasis:
+    """Return the basis with a number of free coefficients."""
+    size = modes + TOP
+    # By Rodrigues' formula the integrals of P_j from -1 vanish at both ends, j times.
+    changes = np.eye(size)[:, TOP:]
+    power = np.polynomial.polynomial.polypow([1.0, 0.0, -1.0], CONTACT)
+    speed = legendre.poly2leg(power)
+    start = np.zeros(size)
+    fourth = legendre.legder(speed / (2.0 * speed[0]), CONTACT)
+    start[: len(fourth)] = fourth
+    twice = integration(size + 2)
+    twice = (twice @ twice)[:, :size]
+    norm = np.sqrt(2.0 / (2.0 * np.arange(size + 2.0) + 1.0))
+    orthonormal, triangle = np.linalg.qr(norm[:, None] * (twice @ changes))
+    directions = np.linalg.solve(triangle.T, changes.T).T
+    # `start` still lacks constants of integration: sigma'' of the polynomial of least degree.
+    second = np.zeros(size + 2)
+    exact = legendre.legder(speed / (2.0 * speed[0]), 1)
+    second[: len(exact)] = exact
+    share = orthonormal.T @ (norm * second)
+    torque_directions = orthonormal / norm[:, None]
+    torque_start = second - torque_directions @ share
+    return MomentumBasis(
+        start=start - directions @ share,
+        directions=directions,
+        torque_start=torque_start,
+        torque_directions=torque_directions,
+        least=float(np.sum((norm * torque_start) ** 2)),
+    )
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def integration(size: int) -> FloatArray:
+    """Return the matrix of the integral from -1 on Legendre coefficients, the last one cut."""
+    matrix = np.zeros((size, size))
+    matrix[0, 0] = 1.0
+    for k in range(size):
+        if k + 1 < size:
+            matrix[k + 1, k] = 1.0 / (2 * k + 1)
+        if k > 0:
+            matrix[k - 1, k] = -1.0 / (2 * k + 1)
+    matrix.setflags(write=False)
+    return matrix
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeriesLaw:
+    """
+    A planned variable as Legendre series of its derivatives, plus one decaying oscillation.
+
+    Attributes
+    ----------
+    duration
+        Length of the motion [s].
+    table
+        Row k holds the coefficients of the k-th derivative in x, shape (7, m).
+    rate, amplitude
+        Of the oscillation Re(amplitude exp(rate (x + 1))).
+    factor, offset
+        Multiply and shift the value.
+
+    """
+
+    duration: float
+    table: FloatArray
+    rate: complex = 0j
+    amplitude: complex = 0j
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def over(self, distance: float, middle: float) -> 'SeriesLaw':
+        """Return the law over another distance about another place [rad]."""
+        return replace(self, factor=distance, offset=middle)
+
+    def jet(self, t: ArrayLike, order: int, /) -> FloatArray:
+        """
+        Return the value and its derivatives up to an order.
+
+        Parameters
+        ----------
+        t
+            Times from the start of the motion, shape (m,) [s].
+        order
+            Highest derivative wanted.
+
+        Returns
+        -------
+        FloatArray
+            Row k holds the k-th derivative, shape (order + 1, m) [rad/s^k].
+
+        """
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        rate = 2.0 / self.duration
+        x = np.clip(rate * times - 1.0, -1.0, 1.0)
+        table = self.table[: order + 1]
+        if order > JET_ORDER:
+            higher = np.zeros((order - JET_ORDER, table.shape[1]))
+            for row in range(len(higher)):
+                derivative = legendre.legder(self.table[-1], row + 1)
+                higher[row, : len(derivative)] = derivative
+            table = np.concatenate([table, higher])
+        result: FloatArray = table @ legendre.legvander(x, table.shape[1] - 1).T
+        if self.amplitude:
+            powers = self.amplitude * self.rate ** np.arange(order + 1)
+            result += np.multiply.outer(powers, np.exp(self.rate * (x + 1.0))).real
+        result *= (self.factor * rate ** np.arange(order + 1.0))[:, None]
+        result[0] += self.offset
+        return result
+
+
+def answer(
+    fourth: FloatArray, torque: FloatArray, flat_map: FlatMap, duration: float
+) -> SeriesLaw:
+    """
+    Return the planned variable from rest at -1/2 that follows a momentum angle.
+
+    Parameters
+    ----------
+    fourth
+        Legendre coefficients of sigma^(4) in x, shape (m,).
+    torque
+        Those of sigma'', shape (m + 2,).
+    flat_map
+        Exact map of the arm.
+    duration
+        Length of the motion [s].
+
+    References
+    ----------
+    (I6) and (I10) of docs/derivation.md.
+
+    """
+    half = 0.5 * duration
+    inner, damped, coupled = flat_map.effort[2:5].tolist()
+    delta, epsilon = damped / inner / half, coupled / inner / half**2
+    turn = epsilon**-0.5
+    if turn > SPLIT_TURN * len(fourth):
+        return _split(torque, delta, epsilon, duration)
+    size = len(fourth) + ceil(TERMS_PER_TURN * turn) + SPARE_TERMS
+    once = integration(size)
+    padded = np.zeros(size)
+    padded[: len(fourth)] = fourth
+    top = np.linalg.solve(epsilon * np.eye(size) + delta * once + once @ once, padded)
+    once = integration(size + JET_ORDER)
+    table = np.zeros((JET_ORDER + 1, size + JET_ORDER))
+    table[JET_ORDER, :size] = top
+    for k in range(JET_ORDER, 0, -1):
+        table[k - 1] = once @ table[k]
+    table[0, 0] -= 0.5
+    table.setflags(write=False)
+    return SeriesLaw(duration=duration, table=table)
+
+
+def _split(torque: FloatArray, delta: float, epsilon: float, duration: float) -> SeriesLaw:
+    """Return the same as a particular solution, a polynomial, and the natural oscillation."""
+    size = len(torque) + 2
+    once = integration(size)
+    sigma = np.zeros((JET_ORDER + 1, size))
+    sigma[2, : len(torque)] = torque
+    sigma[1] = once @ sigma[2]
+    sigma[0] = once @ sigma[1]
+    sigma[0, 0] -= 0.5
+    for k in range(3, JET_ORDER + 1):
+        derivative = legendre.legder(sigma[k - 1])
+        sigma[k, : len(derivative)] = derivative
+    slope = np.zeros((size, size))
+    for k in range(1, size):
+        slope[:k, k] = legendre.legder(np.eye(size)[k])[:k]
+    operator = np.eye(size) + delta * slope + epsilon * slope @ slope
+    table = np.asarray(np.linalg.solve(operator, sigma.T).T, dtype=float)
+    table.setflags(write=False)
+    rate = (-delta + 1j * np.sqrt(4.0 * epsilon - delta**2)) / (2.0 * epsilon)
+    # The fourth derivative of w starts at rest: there the particular solution is smallest.
+    signs = (-1.0) ** np.arange(size)
+    value, growth = -(table[TOP] @ signs), -(table[TOP + 1] @ signs)
+    amplitude = complex(value, (rate.real * value - growth) / rate.imag) / rate**TOP
+    return SeriesLaw(duration=duration, table=table, rate=complex(rate), amplitude=amplitude)

@@ -1,0 +1,52 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Monitor: what a motion leaves behind, judged from measurements alone."""
+
+from flat_planner_ros.core.monitor.adoption import (
+    Adoption,
+    AdoptionRefused,
+    ModelTuner,
+    ReportedEstimate,
+)
+from flat_planner_ros.core.monitor.assessment import load_libraries
+from flat_planner_ros.core.monitor.identification import (
+    ActuatedJoints,
+    identify,
+    StiffnessEstimate,
+)
+from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Residual, select
+from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
+from flat_planner_ros.core.monitor.report import Level, MonitorSettings, VibrationReport
+from flat_planner_ros.core.monitor.vibration_monitor import VibrationMonitor
+
+__all__ = [
+    'ActuatedJoints',
+    'Adoption',
+    'AdoptionRefused',
+    'fit_oscillation',
+    'identify',
+    'Level',
+    'load_libraries',
+    'ModelTuner',
+    'MonitorSettings',
+    'OscillationFit',
+    'PlannedMotion',
+    'ReportedEstimate',
+    'Residual',
+    'select',
+    'StiffnessEstimate',
+    'VibrationMonitor',
+    'VibrationReport',
+]

@@ -1,0 +1,229 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a monitor is told: the planned motion, the measured samples, and their bounded record."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import InvalidRequest, SampledMotion
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RECORD_LIMIT = 8192
+"""Most rows of a record; a longer one keeps every second, fourth, ... row [-]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlannedMotion:
+    """
+    Motion of n joints as planned, ending at rest.
+
+    All times, those of samples too, count from one origin of the caller's choice. A near one is
+    better: a float holds seconds since 1970 to 0.2 microseconds only.
+
+    Attributes
+    ----------
+    joint_names
+        Names of the joints in kinematic order, the passive one last, length n.
+    start
+        Absolute time of the start [s].
+    times
+        Times of the points since the start [s], shape (m,), ascending.
+    positions
+        Joint positions [rad], shape (m, n).
+    velocities
+        Joint velocities [rad/s], shape (m, n), or ``None``.
+    efforts
+        Joint efforts [N m], shape (m, n), or ``None``.
+
+    """
+
+    joint_names: tuple[str, ...]
+    start: float
+    times: Array
+    positions: Array
+    velocities: Array | None = None
+    efforts: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion, and lock the arrays."""
+        names = tuple(self.joint_names)
+        if not names or len(set(names)) != len(names):
+            raise InvalidRequest(f'joint names must be unique and at least one, got {names}')
+        if not np.isfinite(self.start):
+            raise InvalidRequest(f'start of a motion must be finite, got {self.start} s')
+        times = _locked('times', self.times, (np.size(self.times),))
+        if times.size == 0 or times[0] < 0.0 or not (np.diff(times) > 0.0).all():
+            raise InvalidRequest('times of a motion must be ascending from 0 s or later')
+        shape = (times.size, len(names))
+        object.__setattr__(self, 'joint_names', names)
+        object.__setattr__(self, 'times', times)
+        object.__setattr__(self, 'positions', _locked('positions', self.positions, shape))
+        for name, rows in (('velocities', self.velocities), ('efforts', self.efforts)):
+            if rows is not None:
+                object.__setattr__(self, name, _locked(name, rows, shape))
+
+    @property
+    def end(self) -> float:
+        """Return the absolute time T of the last point [s]."""
+        return self.start + float(self.times[-1])
+
+    @property
+    def final(self) -> Array:
+        """Return the last positions [rad], shape (n,)."""
+        final: Array = self.positions[-1]
+        return final
+
+    def is_same(self, other: 'PlannedMotion') -> bool:
+        """Return whether the other motion is this one, received again."""
+        return (
+            self.joint_names == other.joint_names
+            and self.start == other.start
+            and all(
+                _equal(mine, its)
+                for mine, its in (
+                    (self.times, other.times),
+                    (self.positions, other.positions),
+                    (self.velocities, other.velocities),
+                    (self.efforts, other.efforts),
+                )
+            )
+        )
+
+    def reference(self, time: float) -> tuple[Array, Array]:
+        """
+        Return what is planned at an absolute time; at rest before and after the motion.
+
+        Parameters
+        ----------
+        time
+            Absolute time [s].
+
+        Returns
+        -------
+        tuple of Array
+            Positions [rad] and velocities [rad/s], both of shape (n,), by cubic Hermite
+            interpolation if velocities are planned, else by linear interpolation.
+
+        """
+        return self._motion.at(time - self.start)
+
+    @cached_property
+    def _motion(self) -> SampledMotion:
+        """Return the motion between the points."""
+        return SampledMotion(self.times, self.positions, self.velocities)
+
+
+class Residual(NamedTuple):
+    """Measured minus wanted positions [rad] and velocities [rad/s] or ``None``, shape (n,)."""
+
+    positions: Array
+    velocities: Array | None
+
+
+class Record:
+    """
+    Times and rows in the order of arrival, in bounded memory.
+
+    Parameters
+    ----------
+    width
+        Length of a row [-].
+
+    """
+
+    def __init__(self, width: int) -> None:
+        """Start empty."""
+        self._table = np.empty((RECORD_LIMIT, 1 + width))
+        self._count = 0
+        self._stride = 1
+        self._skip = 0
+
+    def __len__(self) -> int:
+        """Return the number of rows held."""
+        return self._count
+
+    def append(self, time: float, row: Array | float) -> None:
+        """Add a row; a full record first drops every second one and goes on half as dense."""
+        if self._skip:
+            self._skip -= 1
+            return
+        if self._count == RECORD_LIMIT:
+            thinned = self._table[::2].copy()
+            self._count = len(thinned)
+            self._table[: self._count] = thinned
+            self._stride *= 2
+        target = self._table[self._count]
+        target[0] = time
+        target[1:] = row
+        self._count += 1
+        self._skip = self._stride - 1
+
+    def between(self, start: float, end: float) -> tuple[Array, Array]:
+        """Return copies of the times [s], shape (m,), and rows, shape (m, width), in between."""
+        table = self._table[: self._count]
+        inside = table[(table[:, 0] >= start) & (table[:, 0] <= end)]
+        return inside[:, 0], inside[:, 1:]
+
+
+def select(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.intp]:
+    """
+    Return where each wanted joint stands among the names.
+
+    Parameters
+    ----------
+    names
+        Joint names as measured, in any order, more than wanted or not.
+    wanted
+        Joint names in the order of the motion, length n.
+
+    Returns
+    -------
+    ndarray of int
+        Indices into `names`, shape (n,).
+
+    Raises
+    ------
+    InvalidRequest
+        If a wanted joint is missing.
+
+    """
+    place = {name: index for index, name in enumerate(names)}
+    missing = [name for name in wanted if name not in place]
+    if missing:
+        raise InvalidRequest(f'no joint {", ".join(missing)} among {", ".join(names) or "none"}')
+    return np.array([place[name] for name in wanted], dtype=np.intp)
+
+
+def _locked(name: str, values: Array, shape: tuple[int, ...]) -> Array:
+    """Return a read-only copy of finite values of the wanted shape."""
+    array = np.array(values, dtype=float)
+    if array.shape != shape:
+        raise InvalidRequest(f'{name} of a motion have shape {array.shape}, not {shape}')
+    if not np.isfinite(array).all():
+        raise InvalidRequest(f'{name} of a motion must be finite')
+    array.setflags(write=False)
+    return array
+
+
+def _equal(mine: Array | None, its: Array | None) -> bool:
+    """Return whether both are missing or equal in every number."""
+    if mine is None or its is None:
+        return mine is its
+    return np.array_equal(mine, its)

@@ -1,0 +1,316 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Monitor of the oscillation after planned motions, fed with times and samples."""
+
+from enum import Enum
+from math import inf, isfinite, nan
+
+from flat_planner_ros.core.arm import InvalidRequest, JointSample
+from flat_planner_ros.core.monitor.assessment import assess
+from flat_planner_ros.core.monitor.motion_record import Array, PlannedMotion, Record, Residual
+from flat_planner_ros.core.monitor.report import MonitorSettings, VibrationReport
+import numpy as np
+
+JUMP = 0.2
+"""Change of a joint angle between two samples, beyond its velocity's, that is no motion [rad]."""
+
+CURVATURE = 1.5
+"""Mean velocity between two samples at most, relative to the larger one at either end [-]."""
+
+UNKNOWN_SPEED = 30.0
+"""Speed that a joint may have where its velocity is not measured [rad/s]."""
+
+
+class Phase(Enum):
+    """What a monitor is waiting for."""
+
+    IDLE = 'idle'
+    """A motion to start."""
+    MOVING = 'moving'
+    """The end of the motion."""
+    SETTLING = 'settling'
+    """The end of the window after it."""
+    DONE = 'done'
+    """The next motion; the last one is closed."""
+
+
+class VibrationMonitor:
+    """
+    Judge what each planned motion leaves behind, one report per motion.
+
+    Time comes with samples and ticks alone, plans start when it reaches their start. A plan
+    replaces the one that still waits for its start; one that has started is judged on what was
+    measured until the next starts, or dropped without a report if it was still moving then. A
+    plan that is first seen after its window gives no report: nothing was watched. Only samples
+    end a window; silence ends it as stale, and a joint that jumps, as an arm that is reset does,
+    ends it there.
+
+    Parameters
+    ----------
+    settings
+        Window, tolerances and expectations; may be replaced at any time.
+
+    """
+
+    def __init__(self, settings: MonitorSettings) -> None:
+        """Wait for a motion."""
+        self.settings = settings
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget motions, samples and times."""
+        self._state = Phase.IDLE
+        self._motion: PlannedMotion | None = None
+        self._pending: PlannedMotion | None = None
+        self._now = self._last_sample = self._heard = -inf
+        self._last: JointSample | None = None
+        self._dropped = self._told = 0
+        self._set_back = 0.0
+        self._positions = self._efforts = Record(0)
+
+    @property
+    def state(self) -> Phase:
+        """Return the phase of the motion that started last."""
+        return self._state
+
+    @property
+    def motion(self) -> PlannedMotion | None:
+        """Return the motion that started last."""
+        return self._motion
+
+    @property
+    def dropped(self) -> int:
+        """Return the number of unusable samples since the last reset [-]."""
+        return self._dropped
+
+    def take_troubles(self) -> list[str]:
+        """Return what was wrong with the samples since this was last asked, a sentence each."""
+        troubles, new = [], self._dropped - self._told
+        if self._set_back:
+            troubles.append(
+                f'the time of the joint states was set back by {self._set_back:.3f} s: plans and '
+                'samples from before are forgotten'
+            )
+        if new:
+            troubles.append(f'{new} joint states dropped: late, repeated or not finite')
+        self._told, self._set_back = self._dropped, 0.0
+        return troubles
+
+    def plan(self, motion: PlannedMotion) -> VibrationReport | None:
+        """
+        Take a planned motion, to be watched from its start.
+
+        Parameters
+        ----------
+        motion
+            The motion; without effect if it is the present or the waiting one again.
+
+        Returns
+        -------
+        VibrationReport or None
+            Report on the former motion, if the new one has started and thereby cuts it short.
+
+        """
+        known = (self._pending, self._motion)
+        if any(other is not None and other.is_same(motion) for other in known):
+            return None
+        self._pending = motion
+        return self._start_pending(self._now)
+
+    def add(self, sample: JointSample) -> VibrationReport | None:
+        """
+        Take a sample; late, repeated and undefined ones are dropped and counted.
+
+        Parameters
+        ----------
+        sample
+            Joint state in the order of the motion's joints.
+
+        Returns
+        -------
+        VibrationReport or None
+            Report on the motion that this sample ends or cuts short.
+
+        Raises
+        ------
+        InvalidRequest
+            If the number of joints is not the motion's.
+
+        """
+        time, positions = sample.time, sample.positions
+        if time < self._last_sample - self.settings.timeout:
+            self._reset_by(self._last_sample - time)
+        # The sum of squares is finite only if all positions are.
+        if not (time > self._last_sample and isfinite(time + float(positions.dot(positions)))):
+            self._dropped += 1
+            return None
+        report = self._advance(time)
+        former, self._last = self._last, sample
+        self._last_sample = self._heard = time
+        motion = self._motion
+        if motion is None or self._state is Phase.DONE:
+            return report
+        _check_size(sample, motion)
+        # Between two motions an arm may be put elsewhere, and nobody minds.
+        since = max(motion.start, time - self.settings.timeout)
+        if former is not None and former.time >= since:
+            jump = _jump(former, sample, motion)
+            if jump:
+                return self._close(time, jump)
+        if time <= motion.end:
+            self._efforts.append(time, nan if sample.efforts is None else sample.efforts)
+        if time >= motion.end:
+            self._positions.append(time, positions)
+        if time >= motion.end + self.settings.window:
+            return self._close(time)
+        return report
+
+    def tick(self, now: float) -> VibrationReport | None:
+        """
+        Take the time, so that silence is noticed.
+
+        Parameters
+        ----------
+        now
+            Present time of the samples' clock [s].
+
+        Returns
+        -------
+        VibrationReport or None
+            Stale report on a motion whose samples stopped, or report on one cut short.
+
+        """
+        if now < self._now - self.settings.timeout:
+            self._reset_by(self._now - now)
+        return self._advance(now)
+
+    def residual(self, sample: JointSample) -> Residual | None:
+        """
+        Return measured minus planned during, measured minus final state after the motion.
+
+        Parameters
+        ----------
+        sample
+            Joint state in the order of the motion's joints.
+
+        Returns
+        -------
+        Residual or None
+            Deviations of positions and velocities, ``None`` before the first motion.
+
+        Raises
+        ------
+        InvalidRequest
+            If the number of joints is not the motion's.
+
+        """
+        if self._motion is None:
+            return None
+        _check_size(sample, self._motion)
+        position, velocity = self._motion.reference(sample.time)
+        return Residual(
+            sample.positions - position,
+            None if sample.velocities is None else sample.velocities - velocity,
+        )
+
+    def _advance(self, now: float) -> VibrationReport | None:
+        """Let time reach now: notice silence, the motion's end, the next motion's start."""
+        self._now = max(self._now, now)
+        report = None
+        silence = now - self._heard
+        if self._is_watching() and silence > self.settings.timeout:
+            report = self._close(now, f'no samples for {silence:.3g} s', stale=True)
+        if self._state is Phase.MOVING and self._motion is not None and now >= self._motion.end:
+            self._state = Phase.SETTLING
+        return self._start_pending(self._now) or report
+
+    def _reset_by(self, step: float) -> None:
+        """Start again after a step back in time [s]."""
+        self.reset()
+        self._set_back = step
+
+    def _is_watching(self) -> bool:
+        """Return whether a motion has started and has no report yet."""
+        return self._state in (Phase.MOVING, Phase.SETTLING)
+
+    def _start_pending(self, now: float) -> VibrationReport | None:
+        """Start the waiting motion if it is time, and report on a former still settling."""
+        motion, former, report = self._pending, self._motion, None
+        if motion is None or now < motion.start:
+            return None
+        is_spliced = False
+        if former is not None and self._is_watching():
+            is_spliced = motion.start <= former.end
+            if not is_spliced:
+                is_cut = motion.start < former.end + self.settings.window
+                cause = 'window cut short by the next motion' if is_cut else ''
+                report = self._close(motion.start, cause)
+        # A motion spliced into a running one starts with what that one has measured.
+        if not (is_spliced and former and former.joint_names == motion.joint_names):
+            self._efforts = Record(len(motion.joint_names))
+        self._positions = Record(len(motion.joint_names))
+        self._motion, self._pending, self._heard = motion, None, now
+        if now < motion.end:
+            self._state = Phase.MOVING
+        else:
+            is_past = now > motion.end + self.settings.window
+            self._state = Phase.DONE if is_past else Phase.SETTLING
+        return report
+
+    def _close(
+        self, until: float, cause: str = '', *, stale: bool = False
+    ) -> VibrationReport | None:
+        """End the watch of the present motion and judge it on the samples before `until`."""
+        self._state = Phase.DONE
+        if self._motion is None:
+            return None
+        return assess(
+            self._motion, self.settings, self._positions, self._efforts, until, cause, stale=stale
+        )
+
+
+def _check_size(sample: JointSample, motion: PlannedMotion) -> None:
+    """Refuse a sample of other joints than the motion's."""
+    shape = (len(motion.joint_names),)
+    for values in (sample.positions, sample.velocities, sample.efforts):
+        if values is not None and values.shape != shape:
+            raise InvalidRequest(f'sample of shape {values.shape} for the joints {shape}')
+
+
+def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> str:
+    """Return which joint has come further than it can have moved, if one has."""
+    if former.positions.shape != sample.positions.shape:
+        return ''
+    change = sample.positions - former.positions
+    if np.abs(change).max() <= JUMP:
+        return ''
+    planned = motion.reference(sample.time)[0] - motion.reference(former.time)[0]
+    elapsed = sample.time - former.time
+    speed = np.maximum(_speed(former), _speed(sample))
+    excess = np.minimum(np.abs(change), np.abs(change - planned)) - CURVATURE * elapsed * speed
+    joint = int(np.argmax(excess))
+    if excess[joint] <= JUMP:
+        return ''
+    return (
+        f'{motion.joint_names[joint]} jumped by {change[joint]:.3g} rad within '
+        f'{1e3 * elapsed:.3g} ms at {sample.time:.3f} s'
+    )
+
+
+def _speed(sample: JointSample) -> Array:
+    """Return how fast each joint moves at most, shape (n,) [rad/s]."""
+    if sample.velocities is None:
+        return np.full(sample.positions.shape, UNKNOWN_SPEED)
+    return np.nan_to_num(np.abs(sample.velocities), nan=UNKNOWN_SPEED, posinf=UNKNOWN_SPEED)

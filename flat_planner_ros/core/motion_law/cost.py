@@ -1,0 +1,223 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Quadratic costs of a motion law; a strategy is nothing but a cost.
+
+J = integral of Y^T Q Y over the motion, Y = (y', y'', ..., y^(6)) and Q66 = 1
+((16) of docs/derivation.md).
+"""
+
+from dataclasses import dataclass, InitVar
+from enum import Enum
+from functools import cache
+
+from flat_planner_ros.core.arm import FlatMap, InvalidCost
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+ORDER = 6
+"""Highest derivative in the cost; the motion law solves an equation of twice this order."""
+
+WEIGHT_EXPONENT = 8
+"""The paper raises r and p to this power, so that useful weights stay below 1000."""
+
+MAX_FACTOR = 1e100
+"""Largest factor of a derivative in a cost; its square and sums of squares still have room."""
+
+MAX_ENTRY = MAX_FACTOR**2
+"""Largest entry of a cost's Q; sums of several still have room."""
+
+MAX_WEIGHT = 1000.0
+"""Largest r or p accepted: beyond, weight**8 times the arm's data may leave double precision."""
+
+SEMIDEFINITE_TOLERANCE = 1e-10
+"""Most negative eigenvalue of a positive-semidefinite Q scaled to unit diagonal [-]."""
+
+SYMMETRY_TOLERANCE = 1e-12
+"""Largest difference of Q_ij and Q_ji relative to sqrt(Q_ii Q_jj) [-]."""
+
+
+class Strategy(Enum):
+    """Named costs of the paper, one's own, and the trade of `insensitive`."""
+
+    POLYNOMIAL = 'polynomial'
+    MIN_CONTROL_EFFORT = 'min_control_effort'
+    MIN_POTENTIAL_ENERGY = 'min_potential_energy'
+    MIXED = 'mixed'
+    CUSTOM = 'custom'
+    INSENSITIVE = 'insensitive'
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class QuadraticCost:
+    """
+    Weights on products of the derivatives of the planned variable.
+
+    Attributes
+    ----------
+    matrix
+        Symmetric positive-semidefinite Q with Q66 = 1, shape (6, 6); Q_ij multiplies
+        y^(i) y^(j), unit s^(i + j - 12).
+    is_sum_of_squares
+        Whether Q has been made as one, which spares the check.
+
+    """
+
+    matrix: FloatArray
+    is_sum_of_squares: InitVar[bool] = False
+
+    def __post_init__(self, is_sum_of_squares: bool) -> None:
+        """Refuse what has no unique minimum."""
+        matrix = np.array(self.matrix, dtype=float)
+        object.__setattr__(self, 'matrix', matrix)
+        matrix.setflags(write=False)
+        if is_sum_of_squares:
+            return
+        if matrix.shape != (ORDER, ORDER):
+            raise InvalidCost(f'Q must be 6 x 6 (36 numbers), got shape {matrix.shape}')
+        infinite = np.argwhere(~np.isfinite(matrix))
+        if infinite.size:
+            i, j = infinite[0]
+            raise InvalidCost(f'Q{i + 1}{j + 1} = {matrix[i, j]:g} must be finite')
+        if np.abs(matrix).max() > MAX_ENTRY:
+            i, j = np.unravel_index(np.argmax(np.abs(matrix)), matrix.shape)
+            raise InvalidCost(f'Q{i + 1}{j + 1} = {matrix[i, j]:g} is beyond {MAX_ENTRY:g}')
+        if matrix[-1, -1] != 1.0:
+            raise InvalidCost(f'Q66 must be 1, got {matrix[-1, -1]:g}')
+        _check_semidefinite(matrix)
+
+    def characteristic(self) -> FloatArray:
+        """
+        Return the characteristic polynomial of the Euler-Lagrange equation in z = beta^2.
+
+        Returns
+        -------
+        FloatArray
+            Coefficients a_0 ... a_6 of sum a_k z^k, ascending, a_0 = 0 and a_6 = 1, shape (7,);
+            a_k multiplies y^(2k), unit s^(2k - 12).
+
+        References
+        ----------
+        (21) of docs/derivation.md; `eq:ode` of the paper.
+
+        """
+        coefficients: FloatArray = _antidiagonals() @ self.matrix.ravel()
+        return coefficients
+
+
+def strategy_cost(
+    strategy: Strategy,
+    flat_map: FlatMap,
+    *,
+    r: float = 0.0,
+    p: float = 0.0,
+    custom: FloatArray | None = None,
+) -> QuadraticCost:
+    """
+    Return the cost of a strategy.
+
+    Parameters
+    ----------
+    strategy
+        Which of the named costs.
+    flat_map
+        Flat map of the arm, whose effort row is weighted by r.
+    r
+        Weight of the squared effort, raised to the power of 8 [(N m)^(-1/4) s^(-3/2) rad^(1/4)].
+    p
+        Weight of the squared acceleration, raised to the power of 8 [1/s].
+    custom
+        Q of the strategy `custom`, shape (6, 6).
+
+    Raises
+    ------
+    InvalidCost
+        A weight outside [0, MAX_WEIGHT], or an inadmissible Q.
+
+    References
+    ----------
+    (17) to (19) of docs/derivation.md; `eq:mintau`, `eq:minpot` of the paper.
+
+    """
+    for name, weight in (('r', r), ('p', p)):
+        if not 0.0 <= weight <= MAX_WEIGHT:
+            raise InvalidCost(f'weight {name} = {weight:g} is outside [0, {MAX_WEIGHT:g}]')
+    if strategy is Strategy.CUSTOM:
+        if custom is None:
+            raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')
+        return QuadraticCost(matrix=custom)
+    matrix = np.zeros((ORDER, ORDER))
+    if strategy in (Strategy.MIN_CONTROL_EFFORT, Strategy.MIXED):
+        effort = flat_map.effort[1:]
+        with np.errstate(over='ignore', invalid='ignore'):
+            weighted = r ** (WEIGHT_EXPONENT // 2) * effort
+        largest = float(np.abs(weighted).max())
+        if not largest < MAX_FACTOR:
+            raise InvalidCost(
+                f'effort weighted with r = {r:g} is up to {largest:.3g}, beyond {MAX_FACTOR:g}: '
+                f'the model has numbers that no arm has'
+            )
+        matrix[: len(effort), : len(effort)] = np.multiply.outer(weighted, weighted)
+    if strategy in (Strategy.MIN_POTENTIAL_ENERGY, Strategy.MIXED):
+        matrix[1, 1] += p**WEIGHT_EXPONENT
+    matrix[-1, -1] = 1.0
+    return QuadraticCost(matrix=matrix, is_sum_of_squares=True)
+
+
+@cache
+def _antidiagonals() -> FloatArray:
+    """Return the matrix that takes Q row by row to the sums of (-1)^i Q_ij over i + j = 2k."""
+    i, j = np.indices((ORDER, ORDER)) + 1
+    sums = np.arange(ORDER + 1)[:, None, None]
+    # Those with an odd sum of indices integrate to boundary terms and drop out.
+    table: FloatArray = np.where(i + j == 2 * sums, (-1.0) ** i, 0.0)
+    return table.reshape(ORDER + 1, ORDER * ORDER)
+
+
+def _check_semidefinite(matrix: FloatArray) -> None:
+    """Judge Q scaled to unit diagonal: its entries have different units and sizes."""
+    diagonal = np.diag(matrix)
+    if (diagonal < 0.0).any():
+        order = int(np.argmin(diagonal)) + 1
+        raise InvalidCost(f'Q{order}{order} = {diagonal[order - 1]:g} must not be negative')
+    # A zero on the diagonal of a semidefinite matrix allows nothing else in its row.
+    empty = diagonal == 0.0
+    if matrix[empty].any() or matrix[:, empty].any():
+        order = int(np.flatnonzero(empty & (matrix.any(0) | matrix.any(1)))[0]) + 1
+        raise InvalidCost(f'Q is indefinite: Q{order}{order} = 0 but row {order} is not zero')
+    root = np.sqrt(np.where(empty, 1.0, diagonal))
+    with np.errstate(over='ignore'):
+        scaled = matrix / root / root[:, None]
+    if np.isinf(scaled).any():
+        i, j = np.argwhere(np.isinf(scaled))[0]
+        raise InvalidCost(
+            f'Q is indefinite: Q{i + 1}{j + 1} = {matrix[i, j]:g} exceeds the root of '
+            f'Q{i + 1}{i + 1} Q{j + 1}{j + 1}'
+        )
+    asymmetry = np.abs(scaled - scaled.T).max()
+    if asymmetry > SYMMETRY_TOLERANCE:
+        i, j = np.unravel_index(np.argmax(np.abs(scaled - scaled.T)), matrix.shape)
+        raise InvalidCost(
+            f'Q must be symmetric, but Q{i + 1}{j + 1} = {matrix[i, j]:g} '
+            f'and Q{j + 1}{i + 1} = {matrix[j, i]:g}'
+        )
+    smallest = float(np.linalg.eigvalsh(scaled)[0])
+    if smallest < -SEMIDEFINITE_TOLERANCE:
+        raise InvalidCost(
+            f'Q must be positive semidefinite, but scaled to unit diagonal it has '
+            f'the eigenvalue {smallest:.3g}'
+        )

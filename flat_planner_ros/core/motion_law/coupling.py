@@ -1,0 +1,238 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Coupling of segments at via points: one banded linear system for a whole path.
+
+Unknown are the weights of every segment's twelve solutions; equations are the conditions at the
+start, at each via point and at the end ((V5) of docs/derivation.md). Weights rather than the
+jets at the via points, because two points close to each other fix the jets between them far more
+stiffly than their neighbours do: in the jets' normal equations the neighbours drown, here each
+condition keeps its own scale.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import UncertifiedPlan
+from flat_planner_ros.core.motion_law.basis import CONDITIONS
+from flat_planner_ros.core.motion_law.segment_basis import SegmentBasis, SOLUTIONS
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+RESIDUAL_STEPS = 3
+"""Corrections of the solved weights by the residual of the conditions."""
+
+BAND = SOLUTIONS + CONDITIONS - 1
+"""Diagonals on either side of the main one that are occupied."""
+
+
+class Weights(NamedTuple):
+    """
+    Weights of all solutions, and how far they are settled.
+
+    Attributes
+    ----------
+    weights
+        Of every segment, whose value at its start counts as 0, shape (p, 12, m).
+    correction
+        What the last correction still changed: largest derivatives 0 to 6 at the segments' ends,
+        shape (7, m). Each correction is smaller than the one before by about the same factor, so
+        it bounds the error even where the conditions are nearly dependent, and their residuals
+        small whatever the weights.
+
+    """
+
+    weights: FloatArray
+    correction: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Coupling:
+    """
+    The conditions on p segments, as blocks of one matrix.
+
+    Attributes
+    ----------
+    ends
+        Derivatives 0 to 6 of every solution at its segment's start and end, shape (p, 2, 7, 12).
+    start, end
+        Derivatives 0 to 5 at both ends, on the first and the last segment, shape (6, 12).
+    joints
+        Conditions at every via point, on the segments before and after it, shape
+        (p - 1, 12, 24): the two values, continuity of the derivatives 1 to 9, and that of
+        w^(10) + relaxation w^(11).
+    start_factors, joint_factors, end_factors
+        By which the conditions have been multiplied, shapes (6,), (p - 1, 12), (6,).
+    column_factors
+        By which the weights have been divided, shape (p, 12).
+
+    """
+
+    ends: FloatArray
+    start: FloatArray
+    joints: FloatArray
+    end: FloatArray
+    start_factors: FloatArray
+    joint_factors: FloatArray
+    end_factors: FloatArray
+    column_factors: FloatArray
+
+    def solve(self, start: FloatArray, steps: FloatArray) -> Weights:
+        """
+        Return the weights of all solutions.
+
+        Parameters
+        ----------
+        start
+            Derivatives 1 to 5 at the start, shape (5, m).
+        steps
+            Value at the end of every segment less that at its start, shape (p, m).
+
+        Raises
+        ------
+        UncertifiedPlan
+            The conditions are singular in double precision.
+
+        """
+        from scipy.linalg.lapack import dgbtrf, dgbtrs  # here: slow to import, for paths only
+
+        target = self._target(start, steps)
+        factors, pivots, failure = dgbtrf(self._banded(), BAND, BAND)
+        if failure:
+            raise UncertifiedPlan('boundary residual', inf, 0.0)
+        weights, _ = dgbtrs(factors, BAND, BAND, target, pivots)
+        for _ in range(RESIDUAL_STEPS):
+            residual = target - self._applied(weights)
+            change, _ = dgbtrs(factors, BAND, BAND, residual, pivots)
+            weights += change
+        at_ends = self.ends @ self._unscaled(change)[:, None]
+        return Weights(self._unscaled(weights), np.abs(at_ends).max(axis=(0, 1)))
+
+    def _unscaled(self, weights: FloatArray) -> FloatArray:
+        """Return weights of the solutions themselves, shape (p, 12, m)."""
+        columns = weights.reshape(*self.column_factors.shape, -1)
+        unscaled: FloatArray = columns * self.column_factors[:, :, None]
+        return unscaled
+
+    def _target(self, start: FloatArray, steps: FloatArray) -> FloatArray:
+        """Return the right-hand side, shape (12 p, m)."""
+        target = np.zeros((SOLUTIONS * len(steps), steps.shape[1]))
+        target[1:CONDITIONS] = start * self.start_factors[1:, None]
+        target[CONDITIONS:-CONDITIONS:SOLUTIONS] = steps[:-1] * self.joint_factors[:, :1]
+        target[-CONDITIONS] = steps[-1] * self.end_factors[0]
+        return target
+
+    def _banded(self) -> FloatArray:
+        """Return the matrix by diagonals, with room for the rows that pivoting exchanges."""
+        size = self.column_factors.size
+        banded = np.zeros((3 * BAND + 1, size), order='F')
+
+        def put(block: FloatArray, row: int, column: int) -> None:
+            rows = row + np.arange(block.shape[0])[:, None]
+            columns = column + np.arange(block.shape[1])
+            banded[2 * BAND + rows - columns, columns] = block
+
+        put(self.start, 0, 0)
+        for index, block in enumerate(self.joints):
+            put(block, CONDITIONS + SOLUTIONS * index, SOLUTIONS * index)
+        put(self.end, size - CONDITIONS, size - SOLUTIONS)
+        return banded
+
+    def _applied(self, weights: FloatArray) -> FloatArray:
+        """Return the matrix times some columns, shape (12 p, m)."""
+        columns = weights.reshape(-1, SOLUTIONS, weights.shape[1])
+        joints = self.joints[:, :, :SOLUTIONS] @ columns[:-1]
+        joints += self.joints[:, :, SOLUTIONS:] @ columns[1:]
+        inner = joints.reshape(-1, weights.shape[1])
+        return np.concatenate([self.start @ columns[0], inner, self.end @ columns[-1]])
+
+
+def coupling(bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: float) -> Coupling:
+    """
+    Return the conditions on the segments of a path.
+
+    Parameters
+    ----------
+    bases
+        Solutions of every segment.
+    halves
+        Half the segments' lengths, shape (p,) [s].
+    relaxation
+        Via points prescribe w + relaxation w' [s].
+
+    """
+    powers = halves[:, None] ** -np.arange(float(SOLUTIONS))
+    at_start = np.array([basis.at_start for basis in bases]) * powers[:, :, None]
+    at_end = np.array([basis.at_end for basis in bases]) * powers[:, :, None]
+    rates = np.array([basis.rates for basis in bases]) / halves[:, None]
+    start_factors, end_factors = _end_factors(rates[0]), _end_factors(rates[-1])
+    # The faster segment's rates: only it can fulfil the conditions on high derivatives.
+    joint_factors = _joint_factors(np.maximum(rates[:-1], rates[1:]))
+    start = at_start[0, :CONDITIONS] * start_factors[:, None]
+    end = at_end[-1, :CONDITIONS] * end_factors[:, None]
+    joints = np.zeros((len(bases) - 1, SOLUTIONS, 2 * SOLUTIONS))
+    _fill_joints(joints[:, :, :SOLUTIONS], at_end[:-1], relaxation, 0)
+    _fill_joints(joints[:, :, SOLUTIONS:], -at_start[1:], relaxation, 1)
+    joints *= joint_factors[:, :, None]
+    largest = np.zeros((len(bases), SOLUTIONS))
+    sizes = np.abs(joints).max(axis=1)
+    largest[:-1] = sizes[:, :SOLUTIONS]
+    np.maximum(largest[1:], sizes[:, SOLUTIONS:], out=largest[1:])
+    np.maximum(largest[0], np.abs(start).max(axis=0), out=largest[0])
+    np.maximum(largest[-1], np.abs(end).max(axis=0), out=largest[-1])
+    columns = 1.0 / largest
+    joints[:, :, :SOLUTIONS] *= columns[:-1, None]
+    joints[:, :, SOLUTIONS:] *= columns[1:, None]
+    ends = np.stack([at_start, at_end], axis=1)[:, :, : CONDITIONS + 1]
+    return Coupling(
+        ends=ends,
+        start=start * columns[0],
+        joints=joints,
+        end=end * columns[-1],
+        start_factors=start_factors,
+        joint_factors=joint_factors,
+        end_factors=end_factors,
+        column_factors=columns,
+    )
+
+
+def _fill_joints(half: FloatArray, table: FloatArray, relaxation: float, row: int) -> None:
+    """Write the conditions on one side of every joint; its value stands in the given row."""
+    half[:, row] = table[:, 0] + relaxation * table[:, 1]
+    half[:, 2:-1] = table[:, 1:-2]
+    half[:, -1] = table[:, -2] + relaxation * table[:, -1]
+
+
+def _end_factors(rates: FloatArray) -> FloatArray:
+    """Return factors of derivatives 0 to 5 after which the i-th solution is largest in row i."""
+    steps = 1.0 / np.sqrt(rates[:-1] * rates[1:])
+    return np.concatenate([[1.0], np.cumprod(steps)])
+
+
+def _joint_factors(rates: FloatArray) -> FloatArray:
+    """
+    Return factors of the conditions at joints, as `_end_factors` for two solutions of each rate.
+
+    Slow solutions of the two segments meet the values, and the pair of the i-th rate the
+    derivatives 2 i - 3 and 2 i - 2 ((V6) of docs/derivation.md).
+    """
+    steps = np.ones((len(rates), SOLUTIONS))
+    steps[:, 2::2] = 1.0 / np.sqrt(rates[:, :-1] * rates[:, 1:])
+    steps[:, 3::2] = 1.0 / rates[:, 1:]
+    return np.asarray(np.cumprod(steps, axis=1), dtype=np.float64)

@@ -1,0 +1,292 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Optimal path: the motion law of least cost through given values at given times.
+
+Between via points it solves the Euler-Lagrange equation; at a via point everything is continuous
+but the momentum that belongs to the prescribed value (docs/derivation.md, section V).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import ceil, log2
+
+from flat_planner_ros.core.arm import InvalidRequest, strict_arithmetic
+from flat_planner_ros.core.motion_law.basis import CONDITIONS
+from flat_planner_ros.core.motion_law.cost import QuadraticCost
+from flat_planner_ros.core.motion_law.coupling import coupling, Weights
+from flat_planner_ros.core.motion_law.extremal import momentum_of, stationarity_residual
+from flat_planner_ros.core.motion_law.law import MAX_DERIVATIVE, MotionLaw
+from flat_planner_ros.core.motion_law.piecewise_law import PiecewiseLaw
+from flat_planner_ros.core.motion_law.segment_basis import segment_basis, SegmentBasis, SOLUTIONS
+from flat_planner_ros.core.motion_law.unit_motion import rounded
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+PROBES = 8
+"""Even times at which each half of a segment is certified, besides those near its ends."""
+
+MAX_DEPTH = 36
+"""Most halvings of the distance to a segment's end at which it is certified."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Path:
+    """
+    What a path goes through.
+
+    Attributes
+    ----------
+    edges
+        0, the times of the via points and the duration, strictly ascending, shape (p + 1,) [s].
+    start
+        Derivatives 0 to 5 of every planned variable at the start, shape (m, 6) [rad/s^k].
+    values
+        What every variable passes at the via points and, last, where it comes to rest, shape
+        (m, p) [rad].
+    relaxations
+        At via points w + relaxation w' takes the value, for each variable, shape (m,) [s].
+
+    """
+
+    edges: FloatArray
+    start: FloatArray
+    values: FloatArray
+    relaxations: FloatArray
+
+    def __post_init__(self) -> None:
+        """Refuse what no path could go through."""
+        for name in ('edges', 'start', 'values', 'relaxations'):
+            array = np.array(getattr(self, name), dtype=float)
+            if not np.isfinite(array).all():
+                raise InvalidRequest(f'the {name} of a path must be finite, got {array}')
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        variables, segments = self.values.shape
+        shapes = self.edges.shape, self.start.shape, self.relaxations.shape
+        if shapes != ((segments + 1,), (variables, CONDITIONS), (variables,)) or not segments:
+            raise InvalidRequest(f'the shapes {shapes} do not fit values {self.values.shape}')
+        if self.edges[0] != 0.0 or not (np.diff(self.edges) > 0.0).all():
+            raise InvalidRequest(f'the times of a path must ascend from 0 s, got {self.edges}')
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OptimalPath:
+    """
+    Laws of least cost and the proof of their quality.
+
+    Attributes
+    ----------
+    laws
+        One for each planned variable.
+    cost_value
+        Integral of Y^T Q Y over the motion, summed over the variables.
+    time_slopes
+        Derivatives of the cost with respect to the times of the via points, duration and values
+        fixed ((V8) of docs/derivation.md), shape (p - 1,) [1/s].
+    boundary_residual
+        Largest miss of a prescribed derivative or value, jump of the derivatives 0 to 5, or last
+        correction of a derivative, relative to that derivative's peak; at least the rounding of
+        the times relative to the shortest segment [-].
+    optimality_residual
+        Largest residual of the Euler-Lagrange equation on a segment or of a natural condition,
+        relative to its terms [-].
+
+    """
+
+    laws: tuple[PiecewiseLaw, ...]
+    cost_value: float
+    time_slopes: FloatArray
+    boundary_residual: float
+    optimality_residual: float
+
+
+def optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
+    """
+    Return the laws of least cost through a path, to be judged by their residuals.
+
+    Raises
+    ------
+    UncertifiedPlan
+        The conditions are singular in double precision.
+    ArithmeticError
+        The numbers leave double precision.
+
+    """
+    with strict_arithmetic():
+        return _optimal_path(cost, path)
+
+
+def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
+    """Return the laws of least cost; numbers out of range are errors."""
+    coefficients = cost.characteristic()
+    halves = 0.5 * np.diff(path.edges)
+    powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
+    reference = _reference(coefficients).tobytes()
+    bases = [segment_basis(key.tobytes(), reference) for key in rounded(coefficients * powers)]
+    # Each segment counts from the value at its start: only steps enter the equations, and a short
+    # segment far from zero loses no digits.
+    origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
+    steps = path.values - origins
+    weights, correction = _weights(bases, halves, path, steps)
+    # Times are rounded: a segment's length is known to this part of it, and slopes with it.
+    boundary = float(np.finfo(float).eps * path.edges[-1] / (2.0 * halves.min()))
+    laws, value, optimality = [], 0.0, 0.0
+    slopes = np.zeros(len(bases) - 1)
+    for variable, relaxation in enumerate(path.relaxations):
+        segments = tuple(
+            MotionLaw(duration=2.0 * half, modes=basis.modes(weight), offset=origin)
+            for basis, half, weight, origin in zip(
+                bases, halves, weights[:, :, variable], origins[variable], strict=True
+            )
+        )
+        laws.append(PiecewiseLaw(edges=path.edges, laws=segments))
+        jets = [_probed(law, basis) for law, basis in zip(segments, bases, strict=True)]
+        # The conserved momentum of every segment, in its middle.
+        momenta = np.array([momentum_of(coefficients, jet[:, -1:])[0] for jet in jets])
+        value += momenta @ steps[variable] - _share_of_start(cost, jets[0][:, 0])
+        joints = np.array([jet[:, 1] for jet in jets[:-1]]).reshape(-1, SOLUTIONS + 1)
+        slopes += 2.0 * np.diff(momenta) * (joints[:, 1] + relaxation * joints[:, 2])
+        peaks = _peaks(path.start[variable, 0], jets)
+        if not peaks.max() < MAX_DERIVATIVE:
+            raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
+        boundary = max(
+            boundary,
+            _relative(correction[:, variable], peaks[: CONDITIONS + 1]),
+            _boundary_residual(path, variable, jets, peaks[:CONDITIONS]),
+        )
+        optimality = max(
+            optimality,
+            _natural_residual(float(relaxation), jets, peaks),
+            *(stationarity_residual(coefficients, jet) for jet in jets),
+        )
+    return OptimalPath(
+        laws=tuple(laws),
+        cost_value=float(value),
+        time_slopes=slopes,
+        boundary_residual=boundary,
+        optimality_residual=optimality,
+    )
+
+
+def _reference(coefficients: FloatArray) -> FloatArray:
+    """Return an equation in units of time, a power of two, in which its roots are of size 1."""
+    sizes = np.abs(coefficients[-2::-1]).tolist()
+    largest = max(size ** (0.5 / n) for n, size in enumerate(sizes, start=1))
+    unit = 2.0 ** -round(log2(largest)) if largest else 1.0
+    reference: FloatArray = coefficients * unit ** np.arange(SOLUTIONS, -1.0, -2.0)
+    return reference
+
+
+def _weights(
+    bases: Sequence[SegmentBasis], halves: FloatArray, path: Path, steps: FloatArray
+) -> Weights:
+    """Return the weights of all solutions; equal relaxations share one factorisation."""
+    weights = np.empty((len(bases), SOLUTIONS, len(steps)))
+    correction = np.empty((CONDITIONS + 1, len(steps)))
+    for relaxation in np.unique(path.relaxations):
+        alike = path.relaxations == relaxation
+        system = coupling(bases, halves, float(relaxation))
+        found = system.solve(path.start[alike, 1:].T, steps[alike].T)
+        weights[:, :, alike] = found.weights
+        correction[:, alike] = found.correction
+    return Weights(weights, correction)
+
+
+def _probed(law: MotionLaw, basis: SegmentBasis) -> FloatArray:
+    """
+    Return derivatives 0 to 12 of a segment at both ends, at probes, and in the middle.
+
+    The probes crowd towards the ends as far as boundary layers can reach, shape (13, m).
+    """
+    near = _near(min(MAX_DEPTH, ceil(log2(basis.rates[-1])) + 3))
+    times = 0.5 * law.duration * np.concatenate([[0.0, 2.0], near, 2.0 - near, [1.0]])
+    return law.jet(times, SOLUTIONS)
+
+
+@cache
+def _near(depth: int) -> FloatArray:
+    """Return normalised distances to an end within half a segment."""
+    return np.union1d(0.5 ** np.arange(1.0, depth + 1.0), np.arange(1.0, PROBES) / PROBES)
+
+
+def _boundary_residual(
+    path: Path, variable: int, jets: Sequence[FloatArray], peaks: FloatArray
+) -> float:
+    """Return the largest miss of a prescribed quantity or jump up to the fifth derivative."""
+    start, values = path.start[variable], path.values[variable]
+    relaxation = path.relaxations[variable]
+    left, right = _sides(jets)
+    rest = np.append(values[-1], np.zeros(CONDITIONS - 1))
+    misses = [jets[0][:CONDITIONS, 0] - start, jets[-1][:CONDITIONS, 1] - rest]
+    misses += list((right - left)[:, :CONDITIONS])
+    missed = np.abs(misses).max(axis=0)
+    for side in (left, right):
+        passed = side[:, 0] + relaxation * side[:, 1] - values[:-1]
+        missed[0] = max(missed[0], np.abs(passed).max(initial=0.0))
+    return _relative(missed, peaks)
+
+
+def _natural_residual(relaxation: float, jets: Sequence[FloatArray], peaks: FloatArray) -> float:
+    """Return the largest jump of a quantity that is continuous along an optimal path."""
+    left, right = _sides(jets)
+    jumps = np.abs(right - left)[:, CONDITIONS : SOLUTIONS - 1].max(axis=0, initial=0.0)
+    tied = (right - left)[:, SOLUTIONS - 2 : SOLUTIONS] @ [1.0, relaxation]
+    jumps[-1] = np.abs(tied).max(initial=0.0)
+    sizes = peaks[CONDITIONS : SOLUTIONS - 1].copy()
+    sizes[-1] += relaxation * peaks[SOLUTIONS - 1]
+    return _relative(jumps, sizes)
+
+
+def _peaks(start: float, jets: Sequence[FloatArray]) -> FloatArray:
+    """Return the largest magnitudes of all derivatives, the value's relative to the start."""
+    highest = np.max([jet.max(axis=1) for jet in jets], axis=0)
+    lowest = np.min([jet.min(axis=1) for jet in jets], axis=0)
+    highest[0] -= start
+    lowest[0] -= start
+    peaks: FloatArray = np.maximum(highest, -lowest)
+    return peaks
+
+
+def _sides(jets: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives before and after every via point, shape (p - 1, 13)."""
+    before = np.array([jet[:, 1] for jet in jets])[:-1]
+    after = np.array([jet[:, 0] for jet in jets])[1:]
+    return before, after
+
+
+def _relative(missed: FloatArray, sizes: FloatArray) -> float:
+    """Return the largest miss relative to a size; where there is no motion none is expected."""
+    return float((missed[missed > 0.0] / sizes[missed > 0.0]).max(initial=0.0))
+
+
+def _share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
+    """
+    Return what a moving start adds to the sum of momenta times steps, with the opposite sign.
+
+    Sum over i = 1 ... 5 of w^(i) times the momentum (V2) of docs/derivation.md.
+    """
+    share = 0.0
+    for i in range(1, CONDITIONS):
+        if jet[i] != 0.0:
+            momentum = sum(
+                (-1.0) ** m * cost.matrix[i + m] @ jet[1 + m : 1 + m + CONDITIONS]
+                for m in range(CONDITIONS - i)
+            )
+            share += momentum * jet[i]
+    return float(share)

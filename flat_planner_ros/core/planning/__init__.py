@@ -1,0 +1,73 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Planning: from what is asked to a certified plan within the limits."""
+
+from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
+from flat_planner_ros.core.planning.course import Law
+from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
+from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
+from flat_planner_ros.core.planning.plan import Plan
+from flat_planner_ros.core.planning.plan_samples import PlanSamples
+from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
+from flat_planner_ros.core.planning.request import (
+    MotionRequest,
+    planned_at_rest,
+    PlanningOptions,
+    ViaPoint,
+)
+from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+from flat_planner_ros.core.planning.stopping import stop_plan
+from flat_planner_ros.core.planning.timing import OnViolation, TimedPlan, Timing
+from flat_planner_ros.core.planning.tradeoff import (
+    advice,
+    baselines,
+    predicted_residual,
+    tradeoff_points,
+    TradeoffPoint,
+)
+from flat_planner_ros.core.planning.via_times import with_via_times
+
+__all__ = [
+    'CONDITIONS',
+    'Strategy',
+    'advice',
+    'baselines',
+    'Extrema',
+    'extrema_of',
+    'JointLimits',
+    'Law',
+    'LimitUse',
+    'MotionRequest',
+    'NoFeasibleDuration',
+    'OnViolation',
+    'Plan',
+    'plan',
+    'planned_at_rest',
+    'PlanningOptions',
+    'PlanSamples',
+    'predicted_residual',
+    'Quantity',
+    'Reason',
+    'RequestRejected',
+    'shortest_plan',
+    'stop_plan',
+    'TimedPlan',
+    'Timing',
+    'tradeoff_points',
+    'TradeoffPoint',
+    'ViaPoint',
+    'with_via_times',
+]

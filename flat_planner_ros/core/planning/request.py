@@ -1,0 +1,194 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is asked of the planner: a motion that ends at rest, and what it minimises."""
+
+from dataclasses import dataclass, field, replace
+from math import isfinite
+
+from flat_planner_ros.core.arm import FlatModel, InvalidRequest
+from flat_planner_ros.core.insensitive import Insensitivity
+from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ViaPoint:
+    """
+    Values that the flat outputs take on the way.
+
+    Attributes
+    ----------
+    time
+        From the start of the motion [s].
+    values
+        Flat outputs y1 ... y_(n-1), shape (n - 1,) [rad].
+
+    """
+
+    time: float
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        """Refuse what is no place in a motion."""
+        object.__setattr__(self, 'values', _angles('via', self.values))
+        if not (isfinite(self.time) and self.time > 0.0):
+            raise InvalidRequest(f'a via point needs a time above 0 s, got {self.time} s')
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotionRequest:
+    """
+    Motion from rest, or from the midst of another motion, to rest.
+
+    Attributes
+    ----------
+    start, final
+        Joint angles at both ends, the elastic joint relaxed, shape (n,) [rad].
+    duration
+        Time to go from one to the other [s].
+    via
+        Points to pass, in the order of time, before the end.
+    start_jets
+        Derivatives 0 to 5 of the planned variables at the start, where the arm moves already,
+        shape (n - 1, 6) [rad/s^k]; they take the place of `start`. None for a start at rest.
+
+    """
+
+    start: FloatArray
+    final: FloatArray
+    duration: float
+    via: tuple[ViaPoint, ...] = ()
+    start_jets: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no plan could answer."""
+        for name in ('start', 'final'):
+            object.__setattr__(self, name, _angles(name, getattr(self, name)))
+        if len(self.start) != len(self.final):
+            raise InvalidRequest(
+                f'start has {len(self.start)} joints, final has {len(self.final)}'
+            )
+        if not (isfinite(self.duration) and self.duration > 0.0):
+            raise InvalidRequest(f'duration must be positive and finite, got {self.duration} s')
+        if self.via:
+            self._check_via()
+        if self.start_jets is not None:
+            self._check_start_jets()
+
+    def stretched(self, duration: float) -> 'MotionRequest':
+        """
+        Return the same motion in another time, each via point at the same share of it.
+
+        The start keeps its derivatives: it is a state, not a part of the motion to be stretched.
+        """
+        if duration == self.duration:
+            return self
+        share = duration / self.duration
+        via = tuple(ViaPoint(time=share * point.time, values=point.values) for point in self.via)
+        return replace(self, duration=duration, via=via)
+
+    def _check_via(self) -> None:
+        """Refuse via points of another arm, or out of order."""
+        previous = 0.0
+        for index, point in enumerate(self.via):
+            if len(point.values) != len(self.final) - 1:
+                raise InvalidRequest(
+                    f'via point {index} has {len(point.values)} values for '
+                    f'{len(self.final) - 1} flat outputs'
+                )
+            if not previous < point.time < self.duration:
+                raise InvalidRequest(
+                    f'via point {index} at {point.time:g} s must lie after {previous:g} s and '
+                    f'before the end at {self.duration:g} s'
+                )
+            previous = point.time
+
+    def _check_start_jets(self) -> None:
+        """Refuse jets that are not finite, or those of another arm, and lock a copy."""
+        jets = np.array(self.start_jets, dtype=float)
+        shape = (len(self.final) - 1, CONDITIONS)
+        if jets.shape != shape or not np.isfinite(jets).all():
+            raise InvalidRequest(f'start_jets must be finite of shape {shape}, got {jets}')
+        jets.setflags(write=False)
+        object.__setattr__(self, 'start_jets', jets)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanningOptions:
+    """
+    What is minimised and how the arm is modelled.
+
+    Attributes
+    ----------
+    strategy
+        Which cost.
+    r, p
+        Weights of effort and potential energy, as in `strategy_cost`.
+    custom
+        Q of the strategy `custom`, shape (6, 6).
+    flat_model
+        Treatment of the damping of the elastic joint.
+    compensate_friction
+        Whether the efforts include what the motors' friction takes, as the model has it.
+    insensitivity
+        Uncertainty of the model, and what the strategy `insensitive` makes of it.
+
+    """
+
+    strategy: Strategy = Strategy.POLYNOMIAL
+    r: float = 150.0
+    p: float = 17.0
+    custom: FloatArray | None = None
+    flat_model: FlatModel = FlatModel.EXACT
+    compensate_friction: bool = False
+    insensitivity: Insensitivity = field(default_factory=Insensitivity)
+
+    def __post_init__(self) -> None:
+        """Lock a copy of the matrix."""
+        if self.custom is not None:
+            custom = np.array(self.custom, dtype=float)
+            custom.setflags(write=False)
+            object.__setattr__(self, 'custom', custom)
+
+
+def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:
+    """
+    Return the planned variables, which are the flat outputs, of an arm at rest.
+
+    Parameters
+    ----------
+    angles
+        Of all joints, shape (n,) [rad].
+
+    Returns
+    -------
+    tuple[float, ...]
+        The last link's absolute angle and q_1 ... q_(n-2), n - 1 numbers [rad].
+
+    """
+    joints = angles.tolist()
+    return (float(sum(joints)), *joints[:-2])
+
+
+def _angles(name: str, values: FloatArray) -> FloatArray:
+    """Return a locked copy of a finite vector."""
+    angles = np.array(values, dtype=float)
+    if angles.ndim != 1 or not np.isfinite(angles).all():
+        raise InvalidRequest(f'{name} angles must be a finite vector, got {angles}')
+    angles.setflags(write=False)
+    return angles

@@ -1,0 +1,87 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Course of an insensitive motion: the elastic end shaped, the other joints on smooth laws."""
+
+from typing import NamedTuple
+
+from flat_planner_ros.core.insensitive import Insensitivity, shaped_motion
+from flat_planner_ros.core.motion_law import CONDITIONS, MotionLaw
+from flat_planner_ros.core.planning.course import FreeCourse, Law
+from flat_planner_ros.core.planning.task import Task
+import numpy as np
+
+
+class ShapedCourse(NamedTuple):
+    """A course and its certificate, residuals as those of a plan."""
+
+    course: FreeCourse
+    boundary_residual: float
+    optimality_residual: float
+
+
+def shaped_course(
+    task: Task, wanted: Insensitivity, start: tuple[float, ...], final: tuple[float, ...]
+) -> ShapedCourse:
+    """
+    Return the insensitive motion from rest to rest.
+
+    Only joint n-1 can excite or quiet the oscillation, and only the planned variable of the
+    elastic end tells its effort: the others move by the task's law, of the same duration.
+
+    Parameters
+    ----------
+    task
+        The arm, the duration, and the law of the other planned variables.
+    wanted
+        Uncertainty and trade.
+    start, final
+        Planned variables at both ends, n - 1 of them, the first of each different [rad].
+
+    Raises
+    ------
+    OutOfReach
+        No motion meets the prescribed bound.
+    InvalidRequest
+        An arm in the box does not oscillate.
+
+    """
+    distance = final[0] - start[0]
+    shaped = shaped_motion(task.arm, task.duration, wanted, distance)
+    laws: list[Law] = [shaped.law.over(distance, 0.5 * (start[0] + final[0]))]
+    for begin, end in zip(start[1:], final[1:], strict=True):
+        laws.append(
+            MotionLaw(
+                duration=task.duration,
+                modes=task.unit.law.modes,
+                factor=end - begin,
+                offset=0.5 * (begin + end),
+            )
+        )
+    rest = np.zeros((len(start), CONDITIONS))
+    rest[:, 0] = start
+    course = FreeCourse(
+        task=task,
+        laws=tuple(laws),
+        start=rest,
+        final=np.array(final),
+        edges=(0.0, task.duration),
+        own_cost=shaped.cost,
+    )
+    unit = task.unit
+    return ShapedCourse(
+        course,
+        max(unit.boundary_residual, shaped.boundary_residual),
+        max(unit.optimality_residual, shaped.stationarity),
+    )

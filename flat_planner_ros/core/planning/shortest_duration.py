@@ -1,0 +1,302 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Shortest duration of a motion within the limits of its joints (docs/derivation.md, section L).
+
+Peaks fall with the duration, velocities nearly with its first power, efforts and deflections with
+its second; but the shape of a law changes with its duration, gravity does not fall at all, and a
+faster motion may even need less effort. So powers only guide the search, which tries durations
+until one that obeys is found next to one that does not, and then looks for others below.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite, log, sqrt
+
+from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, OutOfReach, UncertifiedPlan
+from flat_planner_ros.core.planning.extrema import Quantity
+from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
+from flat_planner_ros.core.planning.plan import Plan
+import numpy as np
+
+DURATION_TOLERANCE = 2e-4
+"""Distance of the answer to a shorter duration that breaks a limit, relative to it [-]."""
+
+SCAN_STEP = 1.2
+"""Ratio of the durations tried below the answer: a feasible range as wide is not missed [-]."""
+
+SCAN_DEPTH = 2.0
+"""Share of the answer down to which shorter ones are looked for, inverted [-]."""
+
+AIM = 1.01
+"""Ratio of a duration tried to the one that powers suggest: it is to lie beyond the root [-]."""
+
+FIRST_STRIDE = 1.1
+"""Least ratio of a duration to the one tried before, if that was too short [-]."""
+
+DIGITS = 9
+"""Significant digits of the durations tried: as many as are reported."""
+
+SAMPLES = 33
+"""Times at which a duration of a scan is looked at: most are ruled out by that."""
+
+POWERS = {Quantity.POSITION: 2.0, Quantity.VELOCITY: 1.0, Quantity.EFFORT: 2.0}
+"""How the use of a limit falls with the duration of a fixed shape, to leading order."""
+
+
+class NoFeasibleDuration(FlatPlannerError):
+    """
+    No duration keeps a motion within the limits.
+
+    Attributes
+    ----------
+    use
+        The limit that is exceeded even by the least exceeding motion.
+    duration
+        Of that motion [s].
+    shortest, longest
+        The durations considered [s].
+    at_end
+        Whether it is an effort beyond its limit at the start or the end already: a static load, or
+        that of the motion from which this one starts.
+
+    """
+
+    def __init__(
+        self,
+        use: LimitUse,
+        duration: float,
+        shortest: float,
+        longest: float,
+        at_end: bool = False,
+    ) -> None:
+        """Keep the numbers, so that a caller can name the joint."""
+        super().__init__(f'no duration from {shortest:g} to {longest:g} s obeys the limits')
+        self.use = use
+        self.duration = duration
+        self.shortest = shortest
+        self.longest = longest
+        self.at_end = at_end
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Trial:
+    """
+    A duration that was tried.
+
+    Attributes
+    ----------
+    duration
+        It [s].
+    plan
+        Its motion; None where there is no certified one.
+    worst
+        The limit of which that uses most; None where nothing is known.
+    ratio
+        Its use [-].
+    estimate
+        Duration at which all limits would just be obeyed if peaks were powers of it [s].
+    is_sampled
+        Whether the use is that at some times only, and there beyond a limit already.
+
+    """
+
+    duration: float
+    plan: Plan | None
+    worst: LimitUse | None
+    ratio: float
+    estimate: float
+    is_sampled: bool = False
+
+    @property
+    def obeys(self) -> bool:
+        """Tell whether the motion obeys all limits."""
+        return self.ratio <= 1.0
+
+
+def shortest_plan(
+    plan_of: Callable[[float], Plan], limits: JointLimits, *, shortest: float, longest: float
+) -> Plan:
+    """
+    Return the plan of the shortest duration that obeys the limits.
+
+    Parameters
+    ----------
+    plan_of
+        Plan of a duration [s].
+    limits
+        Of its joints.
+    shortest, longest
+        Range of the duration [s].
+
+    Returns
+    -------
+    Plan
+        It obeys the limits, and with a duration shorter by `DURATION_TOLERANCE` it would not. No
+        duration on a grid of ratio `SCAN_STEP` down to 1 / `SCAN_DEPTH` of it does either.
+
+    Raises
+    ------
+    InvalidRequest
+        The range is empty or not finite.
+    NoFeasibleDuration
+        No duration on a grid of ratio `SCAN_STEP` over the whole range obeys the limits.
+    FlatPlannerError
+        As `plan_of` raises it, if there is no plan of any duration on that grid.
+
+    """
+    if not (0.0 < shortest <= longest and isfinite(longest)):
+        raise InvalidRequest(f'no range of durations: {shortest:g} to {longest:g} s')
+    return _Search(plan_of, limits, shortest, longest).run()
+
+
+class _Search:
+    """Durations tried so far, and which to try next."""
+
+    def __init__(
+        self,
+        plan_of: Callable[[float], Plan],
+        limits: JointLimits,
+        shortest: float,
+        longest: float,
+    ) -> None:
+        """Start with nothing tried."""
+        self._plan_of, self._limits = plan_of, limits
+        self._shortest, self._longest = shortest, longest
+        self._trials: dict[float, _Trial] = {}
+        self._failure: FlatPlannerError | None = None
+
+    def run(self) -> Plan:
+        """Return the shortest plan found."""
+        if not self._bracket():
+            self._scan(self._shortest, self._longest)
+            self._refuse_if_none()
+        while True:
+            self._refine()
+            lowest = self._lowest
+            self._scan(max(self._shortest, lowest.duration / SCAN_DEPTH), lowest.duration)
+            if self._lowest is lowest and lowest.plan is not None:
+                return lowest.plan
+
+    @property
+    def _lowest(self) -> _Trial:
+        """Return the shortest trial that obeys."""
+        return min((t for t in self._trials.values() if t.obeys), key=lambda t: t.duration)
+
+    def _try(self, duration: float, *, briefly: bool = False) -> _Trial:
+        """Return the trial of a duration, rounded so that its usual text is exactly it."""
+        rounded = float(f'{duration:.{DIGITS}g}')
+        duration = min(max(rounded, self._shortest), self._longest)
+        known = self._trials.get(duration)
+        if known is not None and (briefly or not known.is_sampled):
+            return known
+        try:
+            plan = self._plan_of(duration)
+        except (UncertifiedPlan, OutOfReach) as error:
+            self._failure = error
+            trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
+        else:
+            self._refuse_ends(plan)
+            uses = []
+            if briefly:
+                times = plan.duration * np.linspace(0.0, 1.0, SAMPLES)
+                uses = self._limits.uses_at(plan, times)
+            is_sampled = any(use.exceeded for use in uses)
+            if not is_sampled:
+                uses = self._limits.uses(plan)
+            worst = max(uses, key=lambda use: use.ratio, default=None)
+            stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
+            trial = _Trial(
+                duration=duration,
+                plan=plan,
+                worst=worst,
+                ratio=0.0 if worst is None else worst.ratio,
+                estimate=duration * max(stretch, default=0.0),
+                is_sampled=is_sampled,
+            )
+        self._trials[duration] = trial
+        return trial
+
+    def _bracket(self) -> bool:
+        """Look for one duration that obeys above one that does not; tell if any obeys."""
+        stride = FIRST_STRIDE
+        trial = self._try(sqrt(self._shortest * self._longest))
+        descends = trial.obeys
+        while trial.obeys == descends:
+            here = trial.duration
+            if descends:
+                beyond = max(self._shortest, min(trial.estimate / AIM, here / FIRST_STRIDE))
+            else:
+                beyond = min(self._longest, max(trial.estimate * AIM, here * stride))
+                stride *= stride
+            if beyond == here:
+                break
+            trial = self._try(beyond)
+        return descends or trial.obeys
+
+    def _refine(self) -> None:
+        """Close the gap between the shortest trial that obeys and the next below."""
+        stuck = False
+        while True:
+            good = self._lowest
+            below = [t for t in self._trials.values() if t.duration < good.duration]
+            if not below:
+                if good.duration == self._shortest:
+                    return
+                self._try(max(self._shortest, good.duration / SCAN_STEP))
+                continue
+            bad = max(below, key=lambda t: t.duration)
+            width = good.duration / bad.duration
+            if width <= 1.0 + DURATION_TOLERANCE:
+                return
+            middle = sqrt(bad.duration * good.duration)
+            if not stuck and isfinite(bad.ratio) and good.ratio > 0.0:
+                # Secant in logarithms, where powers are straight lines. It aims a little beyond
+                # the root: one trial on either side of it, that near, closes the gap.
+                share = log(bad.ratio) / log(bad.ratio / good.ratio)
+                middle = bad.duration * width**share * (1.0 + 0.25 * DURATION_TOLERANCE)
+            margin = 1.0 + 0.5 * DURATION_TOLERANCE
+            middle = min(max(middle, bad.duration * margin), good.duration / margin)
+            left = good.duration / middle
+            if self._try(middle).obeys:
+                left = middle / bad.duration
+            stuck = not stuck and log(left) > 0.5 * log(width)
+
+    def _scan(self, low: float, high: float) -> None:
+        """Try a grid of durations between two."""
+        duration = high / SCAN_STEP
+        while duration > low:
+            self._try(duration, briefly=True)
+            duration /= SCAN_STEP
+        self._try(low, briefly=True)
+
+    def _refuse_ends(self, plan: Plan) -> None:
+        """Refuse a motion that starts or ends with too large an effort; looked at once."""
+        if self._trials or Quantity.EFFORT not in self._limits.quantities:
+            return
+        use = self._limits.at_ends(plan)
+        if use is not None:
+            raise NoFeasibleDuration(use, plan.duration, self._shortest, self._longest, True)
+
+    def _refuse_if_none(self) -> None:
+        """Refuse if no trial obeys."""
+        while (least := min(self._trials.values(), key=lambda trial: trial.ratio)).is_sampled:
+            self._try(least.duration)
+        if least.obeys:
+            return
+        if least.worst is not None:
+            raise NoFeasibleDuration(least.worst, least.duration, self._shortest, self._longest)
+        if self._failure is not None:
+            raise self._failure

@@ -1,0 +1,143 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Stopping: the motion that brings a moving arm to rest early, wherever that is easiest.
+
+The final pose is free. Where the cost is least, the momentum that belongs to the value of each
+planned variable is zero at the end ((S2) of docs/derivation.md); it is linear in the final value,
+so that two laws tell where that is.
+"""
+
+from flat_planner_ros.core.arm import UncertifiedPlan
+from flat_planner_ros.core.motion_law import CONDITIONS, momentum_of
+from flat_planner_ros.core.planning.limits import JointLimits
+from flat_planner_ros.core.planning.plan import Plan
+from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST = 1.0 / 16.0
+"""Shortest stop that is considered, in terms of the rest of the motion [-]."""
+
+HALVINGS = 6
+"""Halvings of the range of durations, in logarithm: finds the stop within 5 %."""
+
+DEMAND = 2.0
+"""Peaks that a stop may reach, in terms of those of the motion that it ends [-]."""
+
+REST_DURATION = 0.1
+"""Longest stop of an arm that does not move yet [s]."""
+
+PROBE = 1.0
+"""Distance between the two final values that are tried [rad]."""
+
+
+def stop_plan(
+    running: Plan,
+    pose: FloatArray,
+    jets: FloatArray | None,
+    remaining: float,
+    limits: JointLimits | None = None,
+) -> Plan:
+    """
+    Return the shortest plan to rest that demands little more than the motion that it ends.
+
+    Its peaks of effort and velocity stay below twice the motion's: with the same effort, a motion
+    that is optimal cannot be stopped much before its end. Where no stop keeps within the limits,
+    which may have been lowered since, it takes all the time that the motion would have taken.
+
+    Parameters
+    ----------
+    running
+        The plan that is being carried out, whose model and cost are kept.
+    pose
+        Angles of all joints at the start of the stop, shape (n,) [rad].
+    jets
+        Derivatives 0 to 5 of the planned variables there, shape (n - 1, 6) [rad/s^k]; None when
+        the arm has not begun to move.
+    remaining
+        Time that the motion would still take [s], the longest stop.
+    limits
+        Of the joints, if there are any.
+
+    """
+    arm, options = running.task.arm, running.options
+    if jets is None:
+        request = MotionRequest(start=pose, final=pose, duration=min(remaining, REST_DURATION))
+        return plan(request, arm, options)
+    effort = DEMAND * running.peak_effort
+    velocity = DEMAND * running.peak_velocity
+    best = _stop(running, options, pose, jets, remaining)
+    shortest, longest = SHORTEST * remaining, remaining
+    for _ in range(HALVINGS):
+        middle = (shortest * longest) ** 0.5
+        try:
+            tried = _stop(running, options, pose, jets, middle)
+        except UncertifiedPlan:
+            shortest = middle
+            continue
+        demanding = (tried.peak_effort > effort).any() or (tried.peak_velocity > velocity).any()
+        if demanding or _exceeds(tried, limits):
+            shortest = middle
+        else:
+            best, longest = tried, middle
+    return best
+
+
+def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
+    """Tell whether a stop goes beyond a limit."""
+    use = None if limits is None else limits.worst(tried)
+    return use is not None and use.exceeded
+
+
+def _stop(
+    running: Plan,
+    options: PlanningOptions,
+    pose: FloatArray,
+    jets: FloatArray,
+    duration: float,
+) -> Plan:
+    """Return the plan to rest of a given duration that costs least."""
+    arm = running.task.arm
+    first, second = (
+        plan(
+            MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets),
+            arm,
+            options,
+        )
+        for values in (jets[:, 0], jets[:, 0] + PROBE)
+    )
+    low, high = _end_momenta(first), _end_momenta(second)
+    values = jets[:, 0] + PROBE * low / (low - high)
+    request = MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets)
+    return plan(request, arm, options)
+
+
+def _end_momenta(planned: Plan) -> FloatArray:
+    """Return the momentum of each planned variable at the end, shape (n - 1,)."""
+    coefficients = planned.cost.characteristic()
+    end = np.array([planned.duration])
+    return np.array(
+        [momentum_of(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0] for law in planned.laws]
+    )
+
+
+def _pose(values: FloatArray) -> FloatArray:
+    """Return the joint angles at rest of given planned variables, the elastic joint relaxed."""
+    inner = values[1:]
+    return np.array([*inner, values[0] - inner.sum(), 0.0])

@@ -1,0 +1,183 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Task: all that plans of one arm, cost and duration have in common, computed once and kept."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+from flat_planner_ros.core.arm import flat_map, FlatMap, PlanarArm, strict_arithmetic
+from flat_planner_ros.core.motion_law import (
+    CONDITIONS,
+    GRIDS_KEPT,
+    JET_ORDER,
+    MAX_KEPT_INTERVALS,
+    QuadraticCost,
+    strategy_cost,
+    unit_motion,
+    UnitMotion,
+)
+from flat_planner_ros.core.planning.request import PlanningOptions
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+MAX_NUMBER = 1e300
+"""Largest number in a plan; products with weights of order one still have room."""
+
+TASKS_KEPT = 64
+"""Combinations of arm, options and duration whose unit motion is remembered."""
+
+_ORDERS = np.arange(JET_ORDER + 1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """
+    What a plan is made from, besides its ends: the motion over 1 rad.
+
+    Attributes
+    ----------
+    arm
+        What moves.
+    duration
+        Length of the motion [s].
+    cost
+        What is minimised.
+    flat_map
+        From the planned variable to the joints.
+    unit
+        The law in normalised time.
+    rates
+        Factors of its derivatives 0 to 6 in physical time, shape (7,) [1/s^k].
+    cost_value
+        Cost of 1 rad.
+    reach
+        Distance from which numbers overflow [rad].
+
+    """
+
+    arm: PlanarArm
+    duration: float
+    cost: QuadraticCost
+    flat_map: FlatMap
+    unit: UnitMotion
+    rates: FloatArray
+    cost_value: float
+    reach: float
+
+    @property
+    def rates_of_modes(self) -> NDArray[np.complex128]:
+        """Return the characteristic roots that the unit motion is made of, (m,) [2 / duration]."""
+        return np.array([mode.rate for mode in self.unit.law.modes])
+
+    @cached_property
+    def rows(self) -> FloatArray:
+        """Torque and velocities of the last two joints from the unit motion's jet, (3, 7)."""
+        mapping = self.flat_map
+        rows = np.zeros((3, JET_ORDER + 1))
+        rows[0, : len(mapping.effort)] = mapping.effort
+        rows[1, 1 : len(mapping.output) + 1] = mapping.output
+        rows[2, 1 : len(mapping.deflection) + 1] = mapping.deflection
+        rows[1] -= rows[2]
+        rows *= self.rates
+        return rows
+
+    def grid(self, intervals: int) -> FloatArray:
+        """Return the derivatives 0 to 6 and the torque at even times, read-only, shape (8, m)."""
+        return (_grid if intervals > MAX_KEPT_INTERVALS else _kept_grid)(self, intervals)
+
+    def fill_grid(self, table: FloatArray, distance: float) -> None:
+        """Write the derivatives 0 to 6 and the torque over a distance at even times, (8, m)."""
+        intervals = table.shape[1] - 1
+        if intervals <= MAX_KEPT_INTERVALS:
+            np.multiply(_kept_grid(self, intervals), distance, out=table)
+        else:
+            _fill(self, table, distance)
+
+
+@lru_cache(maxsize=TASKS_KEPT)
+def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
+    """
+    Return what plans of an arm have in common; arms and options count as equal if identical.
+
+    Raises
+    ------
+    ArithmeticError
+        The numbers leave double precision.
+    FlatPlannerError
+        The arm, the weights or the equation allow no plan.
+
+    """
+    mapping = flat_map(arm, options.flat_model)
+    cost = strategy_cost(
+        options.strategy, mapping, r=options.r, p=options.p, custom=options.custom
+    )
+    half = 0.5 * float(duration)
+    powers = half**_ORDERS
+    with strict_arithmetic():
+        unit = unit_motion(cost.characteristic() * powers[::-1] ** 2)
+        rates = 1.0 / powers
+        largest = float((rates * unit.peaks).max())
+    # (35) with every derivative in units of the half duration.
+    cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
+    # A law that is no minimum, which its certificate refuses, might have a negative cost.
+    # Roots first: a cost of less than 1e-8 would take the quotient out of range.
+    reach = min(MAX_NUMBER / largest, MAX_NUMBER**0.5 / cost_value**0.5) if cost_value > 0 else 0.0
+    return Task(
+        arm=arm,
+        duration=duration,
+        cost=cost,
+        flat_map=mapping,
+        unit=unit,
+        rates=rates,
+        cost_value=cost_value,
+        reach=reach,
+    )
+
+
+def _grid(task: Task, intervals: int) -> FloatArray:
+    """Return the motion over 1 rad at even times."""
+    table = np.empty((len(task.rates) + 1, intervals + 1))
+    _fill(task, table, 1.0)
+    table.setflags(write=False)
+    return table
+
+
+def _fill(task: Task, table: FloatArray, distance: float) -> None:
+    """Write the motion over a distance at even times."""
+    task.unit.fill_grid(table[:-1], distance * task.rates)
+    row = task.flat_map.effort
+    np.matmul(row, table[: len(row)], out=table[-1])
+
+
+_kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
+
+
+def even_times(duration: float, intervals: int) -> FloatArray:
+    """Return even times of a motion, both ends exact, read-only, shape (m,) [s]."""
+    return (_times if intervals > MAX_KEPT_INTERVALS else _kept_times)(duration, intervals)
+
+
+def _times(duration: float, intervals: int) -> FloatArray:
+    """Return even times of a motion."""
+    times = np.arange(intervals + 1.0)
+    times /= intervals
+    times *= duration
+    times.setflags(write=False)
+    return times
+
+
+_kept_times = lru_cache(maxsize=GRIDS_KEPT)(_times)

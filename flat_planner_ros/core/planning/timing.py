@@ -1,0 +1,191 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Time for a motion: as prescribed if the limits allow it, else refused, stretched or found."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from flat_planner_ros.core.planning.extrema import Quantity
+from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
+from flat_planner_ros.core.planning.plan import Plan
+from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
+from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+REASONS = {
+    Quantity.POSITION: Reason.POSITION_LIMIT,
+    Quantity.VELOCITY: Reason.VELOCITY_LIMIT,
+    Quantity.EFFORT: Reason.EFFORT_LIMIT,
+}
+"""Why a request is rejected that exceeds a limit."""
+
+
+class OnViolation(Enum):
+    """What becomes of a motion whose prescribed duration is too short for the limits."""
+
+    REJECT = 'reject'
+    """It is refused, with the shortest duration that is not."""
+
+    SCALE = 'scale'
+    """It takes that duration instead."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TimedPlan:
+    """
+    A plan within limits, and how its duration came about.
+
+    Attributes
+    ----------
+    plan
+        It obeys all limits.
+    duration_min
+        The shortest duration that does; None where it was not asked for [s].
+    exceeded
+        What the prescribed duration would have exceeded; None unless the motion was stretched.
+
+    """
+
+    plan: Plan
+    duration_min: float | None = None
+    exceeded: LimitUse | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Timing:
+    """
+    Rules for durations.
+
+    Attributes
+    ----------
+    joints
+        Names in kinematic order.
+    limits
+        What the joints may do.
+    on_violation
+        What becomes of a prescribed duration that is too short.
+    shortest, longest
+        Range of durations [s].
+
+    """
+
+    joints: Sequence[str]
+    limits: JointLimits
+    on_violation: OnViolation
+    shortest: float
+    longest: float
+
+    def check_pose(self, which: str, positions: FloatArray) -> None:
+        """
+        Refuse a pose outside the position limits.
+
+        Parameters
+        ----------
+        which
+            Its name in the sentence.
+        positions
+            Angles at rest, shape (n,) [rad].
+
+        """
+        use = self.limits.pose_violation(positions)
+        if use is None:
+            return
+        name = self.joints[use.joint]
+        raise RequestRejected(
+            Reason.POSITION_LIMIT,
+            f'{which} position {use.value:.6g} rad of {name} is beyond its limit '
+            f'{use.limit:.6g} rad',
+            joint=name,
+            value=use.value,
+            limit=use.limit,
+        )
+
+    def timed(self, plan_of: Callable[[float], Plan], duration: float | None) -> TimedPlan:
+        """
+        Return the plan of a motion within the limits.
+
+        Parameters
+        ----------
+        plan_of
+            Plan of a duration [s].
+        duration
+            Prescribed [s]; None for the shortest that obeys the limits.
+
+        Raises
+        ------
+        RequestRejected
+            No duration obeys the limits, or the prescribed one does not.
+        FlatPlannerError
+            There is no plan of the prescribed duration, or of any.
+
+        """
+        if duration is None:
+            found = self._shortest(plan_of, self.shortest)
+            return TimedPlan(plan=found, duration_min=found.duration)
+        prescribed = plan_of(duration)
+        use = self.limits.worst(prescribed)
+        if use is None or not use.exceeded:
+            return TimedPlan(plan=prescribed)
+        scales = self.on_violation is OnViolation.SCALE
+        # To stretch is to take longer, even if something shorter obeys as well.
+        found = self._shortest(plan_of, duration if scales else self.shortest, use)
+        if scales:
+            return TimedPlan(plan=found, duration_min=found.duration, exceeded=use)
+        remedy = f'the shortest feasible duration is {found.duration:.9g} s'
+        raise self._rejection(use, f'{self._sentence(use)}; {remedy}', found.duration)
+
+    def _shortest(
+        self, plan_of: Callable[[float], Plan], shortest: float, exceeded: LimitUse | None = None
+    ) -> Plan:
+        """Return the shortest plan, or reject by what a prescribed one, or the best, exceeds."""
+        try:
+            return shortest_plan(plan_of, self.limits, shortest=shortest, longest=self.longest)
+        except NoFeasibleDuration as error:
+            if error.at_end:
+                where = 'at the start' if error.use.time == 0.0 else 'at rest in the final pose'
+                name = self.joints[error.use.joint]
+                why = (
+                    f'the effort of {name} {where} is {error.use.value:.6g} N m at any duration, '
+                    f'beyond the limit {error.use.limit:.6g} N m'
+                )
+                raise self._rejection(error.use, why) from error
+            why = '' if exceeded is None else f'{self._sentence(exceeded)}; '
+            why += (
+                f'no duration from {shortest:g} to {self.longest:g} s obeys the limits: with the '
+                f'best, {error.duration:.4g} s, {self._sentence(error.use)}'
+            )
+            raise self._rejection(exceeded or error.use, why) from error
+
+    def _sentence(self, use: LimitUse) -> str:
+        """Return what happens to a joint."""
+        return use.sentence(self.joints[use.joint])
+
+    def _rejection(
+        self, use: LimitUse, message: str, duration_min: float | None = None
+    ) -> RequestRejected:
+        """Return the refusal of a motion for a limit that it exceeds."""
+        return RequestRejected(
+            REASONS[use.quantity],
+            message,
+            joint=self.joints[use.joint],
+            value=use.value,
+            limit=use.limit,
+            time=use.time,
+            duration_min=duration_min,
+        )

@@ -1,0 +1,287 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Effort against residual: what a motion leaves behind, what others would, and what time buys.
+
+Nothing here is simulated: every residual is the integral of `robustness` over the effort.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, PlanarArm
+from flat_planner_ros.core.insensitive import (
+    Nominal,
+    predict_residual,
+    PredictedResidual,
+    shaped_quintic,
+    Shaper,
+)
+from flat_planner_ros.core.motion_law import Strategy
+from flat_planner_ros.core.planning.plan import Plan
+from flat_planner_ros.core.planning.plan_samples import PlanSamples
+from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+INTERVALS = 1000
+"""
+Parts of a motion over which its effort is taken to be linear.
+
+The residual is then good to 1e-7 rad for motions of about a period and 16 coefficients.
+"""
+
+ADVICE_INTERVALS = 200
+"""The same for advice, where 1e-3 of the residual does not matter."""
+
+STRETCHES = (1.05, 1.1, 1.2)
+"""Longer durations that advice considers, over the present one [-]."""
+
+PAYS = 0.5
+"""Share of the worst residual, or less, that must be left for a stretch to pay [-]."""
+
+NOTICEABLE = 1e-3
+"""Worst residual below which there is nothing to advise [rad]."""
+
+STRATEGIES = (
+    Strategy.POLYNOMIAL,
+    Strategy.MIN_CONTROL_EFFORT,
+    Strategy.MIN_POTENTIAL_ENERGY,
+)
+"""Those of the paper, which the trade is compared with."""
+
+WEIGHTS = tuple(10.0 ** (0.125 * step) for step in range(8, 29))
+"""Weights of a sweep, from nearly the least effort to nearly the least residual."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TradeoffPoint:
+    """
+    One motion in the plane of effort and residual.
+
+    Attributes
+    ----------
+    series
+        What it belongs to, e.g. a strategy.
+    duration
+        Its length [s].
+    weight
+        That of a sweep, 0 elsewhere [-].
+    rms_effort, peak_effort
+        Of joint n-1 [N m].
+    nominal, worst
+        Predicted residual amplitudes [rad].
+
+    """
+
+    series: str
+    duration: float
+    weight: float
+    rms_effort: float
+    peak_effort: float
+    nominal: float
+    worst: float
+
+
+def predicted_residual(planned: Plan, samples: PlanSamples | None = None) -> PredictedResidual:
+    """
+    Return what a plan leaves behind, as it is played with linear interpolation.
+
+    Parameters
+    ----------
+    planned
+        The motion; its options say what may differ from the model.
+    samples
+        The command's even grid; None for one that is as good as continuous.
+
+    Raises
+    ------
+    InvalidRequest
+        An arm within the uncertainty does not oscillate.
+
+    """
+    if samples is None:
+        samples = planned.sample(planned.duration / INTERVALS)
+    start = (0.0, 0.0)
+    if planned.request.start_jets is not None:
+        start = (float(samples.positions[0, -1]), float(samples.velocities[0, -1]))
+    return predict_residual(
+        planned.task.arm,
+        samples.torque,
+        planned.duration,
+        planned.options.insensitivity.box,
+        start,
+    )
+
+
+def advice(planned: Plan, residual: PredictedResidual) -> str | None:
+    """
+    Return a line on what a little more time would do, None where it does not pay.
+
+    Parameters
+    ----------
+    planned
+        A motion from rest to rest without via points; for any other there is no advice.
+    residual
+        What it leaves behind.
+
+    """
+    request = planned.request
+    if residual.worst < NOTICEABLE or request.via or request.start_jets is not None:
+        return None
+    line = None
+    # The longest first: where that does not pay, nothing does.
+    for stretch in sorted(STRETCHES, reverse=True):
+        duration = stretch * request.duration
+        try:
+            longer = plan(replace(request, duration=duration), planned.task.arm, planned.options)
+        except FlatPlannerError:
+            return line
+        left = predicted_residual(longer, longer.sample(duration / ADVICE_INTERVALS))
+        if left.worst > PAYS * residual.worst:
+            return line
+        line = (
+            f'{100.0 * (stretch - 1.0):.0f} % longer ({duration:.4g} s) cuts the worst residual '
+            f'from {residual.worst:.2g} to {left.worst:.2g} rad'
+        )
+    return line
+
+
+def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:
+    """
+    Return what simpler methods would do in place of a plan: polynomial law and shaped quintics.
+
+    Those that need more time than there is are left out; so are all for an arm that does not
+    oscillate, and for motions that do not start at rest.
+    """
+    request, arm = planned.request, planned.task.arm
+    if request.via or request.start_jets is not None:
+        return ()
+    options = replace(planned.options, strategy=Strategy.POLYNOMIAL)
+    try:
+        found = [_point('polynomial', plan(request, arm, options))]
+    except InvalidRequest:
+        return ()
+    times = np.linspace(0.0, request.duration, INTERVALS + 1)
+    distance = float(np.sum(request.final) - np.sum(request.start))
+    for shaper in Shaper:
+        try:
+            effort = shaped_quintic(arm, distance, request.duration, shaper, times)
+        except InvalidRequest:
+            continue
+        residual = predict_residual(
+            arm, effort, request.duration, planned.options.insensitivity.box
+        )
+        name = 'quintic' if shaper is Shaper.NONE else f'{shaper.name.lower()}_quintic'
+        found.append(
+            TradeoffPoint(
+                series=name,
+                duration=request.duration,
+                weight=0.0,
+                rms_effort=_rms(effort),
+                peak_effort=float(np.abs(effort).max()),
+                nominal=residual.nominal,
+                worst=residual.worst,
+            )
+        )
+    return tuple(found)
+
+
+def tradeoff_points(
+    request: MotionRequest,
+    arm: PlanarArm,
+    options: PlanningOptions,
+    *,
+    stretches: Sequence[float] = (1.0, 1.1, 1.25, 1.5),
+    weights: Sequence[float] = WEIGHTS,
+) -> tuple[TradeoffPoint, ...]:
+    """
+    Return effort and residual of strategies, baselines and sweeps of `insensitive`.
+
+    Parameters
+    ----------
+    request
+        A motion from rest to rest.
+    arm, options
+        Model, weights of the strategies, uncertainty.
+    stretches
+        Durations of the sweeps, over that of the request [-].
+    weights
+        Of the sweeps [-].
+
+    Raises
+    ------
+    FlatPlannerError
+        The arm or the request allows no plan.
+
+    """
+    points = [
+        _point(strategy.value, plan(request, arm, replace(options, strategy=strategy)))
+        for strategy in STRATEGIES
+    ]
+    reference = plan(request, arm, replace(options, strategy=Strategy.POLYNOMIAL))
+    points += baselines(reference)[1:]
+    for stretch in stretches:
+        stretched = replace(request, duration=stretch * request.duration)
+        for nominal in Nominal:
+            points += _sweep(stretched, arm, options, nominal, weights)
+    return tuple(points)
+
+
+def _sweep(
+    request: MotionRequest,
+    arm: PlanarArm,
+    options: PlanningOptions,
+    nominal: Nominal,
+    weights: Sequence[float],
+) -> Iterator[TradeoffPoint]:
+    """Return insensitive motions of one duration over the weights."""
+    for weight in weights:
+        wanted = replace(
+            options.insensitivity,
+            nominal=nominal,
+            weight=weight,
+            max_effort_rms=0.0,
+            max_residual=0.0,
+        )
+        planned = plan(
+            request,
+            arm,
+            replace(options, strategy=Strategy.INSENSITIVE, insensitivity=wanted),
+        )
+        yield _point(f'insensitive_{nominal.value}', planned, weight)
+
+
+def _point(series: str, planned: Plan, weight: float = 0.0) -> TradeoffPoint:
+    """Return a plan as a point."""
+    samples = planned.sample(planned.duration / INTERVALS)
+    residual = predicted_residual(planned, samples)
+    return TradeoffPoint(
+        series=series,
+        duration=planned.duration,
+        weight=weight,
+        rms_effort=_rms(samples.torque),
+        peak_effort=float(np.abs(samples.torque).max()),
+        nominal=residual.nominal,
+        worst=residual.worst,
+    )
+
+
+def _rms(effort: FloatArray) -> float:
+    """Return the root mean square of an effort that is zero at both ends, on an even grid."""
+    return float(np.sqrt((effort @ effort) / (len(effort) - 1)))

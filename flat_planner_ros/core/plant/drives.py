@@ -1,0 +1,121 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the motors of an arm apply: commanded effort, feedback, their limits, and the weight."""
+
+from math import inf
+
+from flat_planner_ros.core.arm import InvalidModel, PlanarArm
+from flat_planner_ros.core.plant.effort_profile import JointReference
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Drives:
+    """
+    The motors of the actuated joints.
+
+    Where nothing is commanded they carry the weight of the arm, as the brakes or the gravity
+    compensation of a real one do; that is nothing in a horizontal plane.
+
+    Parameters
+    ----------
+    arm
+        What they move.
+    saturation
+        Largest effort of each motor, shape (n-1,) [N m]; unlimited by default.
+    feedback_p, feedback_d
+        Gains on position and velocity errors, shape (n-1,) [N m/rad], [N m s/rad]; zeros by
+        default. They act where a command has positions.
+
+    Raises
+    ------
+    InvalidModel
+        If a number has no meaning.
+
+    """
+
+    def __init__(
+        self,
+        arm: PlanarArm,
+        *,
+        saturation: npt.ArrayLike | None = None,
+        feedback_p: npt.ArrayLike | None = None,
+        feedback_d: npt.ArrayLike | None = None,
+    ) -> None:
+        """Apply nothing but what carries the weight."""
+        motors = arm.n - 1
+        self._saturation = _per_motor('saturation', saturation, motors, inf, 'N m')
+        self._feedback_p = _per_motor('feedback_p', feedback_p, motors, 0.0, 'N m/rad')
+        self._feedback_d = _per_motor('feedback_d', feedback_d, motors, 0.0, 'N m s/rad')
+        self._is_limited = bool(np.isfinite(self._saturation).any())
+        self.has_feedback = bool(self._feedback_p.any() or self._feedback_d.any())
+        self.arm = arm
+        """What they move; may be replaced."""
+        nothing, missing = np.zeros(motors), np.full(motors, np.nan)
+        self.idle = JointReference(nothing, missing, missing)
+        """What stands for no command; its arrays are known by being these very ones."""
+
+    def feed_forward(self, reference: JointReference, q: Array) -> Array:
+        """Return what is applied without looking at errors, shape (n-1,) [N m]."""
+        if self.arm.has_weight and reference.effort is self.idle.effort:
+            return self.arm.gravity_effort(q)[:-1]
+        return reference.effort
+
+    def asked(self, reference: JointReference, q: Array, dq: Array) -> Array:
+        """
+        Return feed-forward and feedback, before the motors' limits.
+
+        Parameters
+        ----------
+        reference
+            What is commanded.
+        q, dq
+            Joint angles [rad] and velocities [rad/s], shape (n,).
+
+        Returns
+        -------
+        Array
+            Shape (n-1,) [N m].
+
+        """
+        effort = self.feed_forward(reference, q)
+        if not self.has_feedback or reference.position is self.idle.position:
+            return effort
+        return (
+            effort
+            + self._feedback_p * (reference.position - q[:-1])
+            + self._feedback_d * (reference.velocity - dq[:-1])
+        )
+
+    def limited(self, effort: Array) -> Array:
+        """Return what the motors can give, the very same array if that is all of it."""
+        if not self._is_limited:
+            return effort
+        given = np.minimum(np.maximum(effort, -self._saturation), self._saturation)
+        return effort if (given == effort).all() else given
+
+
+def _per_motor(
+    name: str, value: npt.ArrayLike | None, motors: int, default: float, unit: str
+) -> Array:
+    """Return one non-negative number per motor."""
+    array = np.full(motors, default) if value is None else np.array(value, dtype=float)
+    if array.shape != (motors,):
+        raise InvalidModel(f'{name} must have {motors} entries, got shape {array.shape}')
+    if not (array >= 0.0).all():
+        raise InvalidModel(f'{name} must be at least 0 {unit}, got {array}')
+    return array

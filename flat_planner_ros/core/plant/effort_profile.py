@@ -1,0 +1,219 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Stamped effort commands, played by time as joint_trajectory_controller plays them."""
+
+from bisect import bisect_right
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import InvalidCommand, SampledMotion
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+MAX_EFFORT = 1e6
+"""Largest effort of a command [N m]: no motor of a robot gives more, a broken sender may."""
+
+
+MAX_POSITION = 1e6
+"""Largest angle of a command [rad]; as for goals."""
+
+MAX_VELOCITY = 1e4
+"""Largest velocity of a command [rad/s]: six hundred times the fastest motion of pi in 1 s."""
+
+
+class JointReference(NamedTuple):
+    """
+    What a command asks of the actuated joints at one time.
+
+    Attributes
+    ----------
+    effort, position, velocity
+        Shape (n-1,) [N m], [rad], [rad/s]; position and velocity NaN where none are commanded.
+
+    """
+
+    effort: Array
+    position: Array
+    velocity: Array
+
+
+class _Course(NamedTuple):
+    """Efforts that are linear in time between knots; times from the command's start [s]."""
+
+    times: list[float]
+    efforts: Array
+    slopes: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EffortProfile:
+    """
+    A stamped effort command, played by time like joint_trajectory_controller does.
+
+    It is checked as a whole before any of it is played. Efforts are linear between the points. The
+    last point is held after the end. Before the first point the effort goes linearly from the
+    anchor to it; nothing is applied before the start when there is no anchor.
+
+    Attributes
+    ----------
+    start
+        Absolute time of the command's stamp [s].
+    times
+        Times of the points from the start, increasing, shape (m,) [s].
+    efforts
+        Efforts of the actuated joints, shape (m, n-1) [N m].
+    positions, velocities
+        Where the arm should be, shape (m, n-1) [rad], [rad/s]; both or only positions or none;
+        velocities are zero at the end.
+    anchor_time, anchor_effort
+        Time at which the command was taken over [s] and the effort then, shape (n-1,) [N m].
+
+    """
+
+    start: float
+    times: Array
+    efforts: Array
+    positions: Array | None = None
+    velocities: Array | None = None
+    anchor_time: float | None = None
+    anchor_effort: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be played and lock the arrays."""
+        start = float(self.start)
+        if not np.isfinite(start):
+            raise InvalidCommand(f'start must be finite, got {start} s')
+        times = locked('times', self.times, 's')
+        if times.ndim != 1 or times.size < 1:
+            raise InvalidCommand(f'times must be (m,) with m >= 1, got shape {times.shape}')
+        if times[0] < 0.0:
+            raise InvalidCommand(f'times must not be negative, got {times[0]:g} s')
+        if (np.diff(times) <= 0.0).any():
+            i = int(np.argmax(np.diff(times) <= 0.0))
+            raise InvalidCommand(
+                f'times must increase, got {times[i]:.9g} s then {times[i + 1]:.9g} s'
+            )
+        efforts = locked('efforts', self.efforts, 'N m')
+        if efforts.ndim != 2 or efforts.shape[0] != times.size or efforts.shape[1] < 1:
+            raise InvalidCommand(
+                f'efforts must be ({times.size}, n-1) with n >= 2, got shape {efforts.shape}'
+            )
+        check_bound('effort', efforts, MAX_EFFORT, 'N m')
+        if self.velocities is not None and self.positions is None:
+            raise InvalidCommand('velocities need positions')
+        if (self.anchor_time is None) != (self.anchor_effort is None):
+            raise InvalidCommand('anchor_time and anchor_effort go together')
+        for name, value in {'start': start, 'times': times, 'efforts': efforts}.items():
+            object.__setattr__(self, name, value)
+        self._lock_optional('positions', self.positions, efforts.shape, 'rad')
+        self._lock_optional('velocities', self.velocities, efforts.shape, 'rad/s')
+        if self.positions is not None:
+            check_bound('position', self.positions, MAX_POSITION, 'rad')
+        if self.velocities is not None:
+            check_bound('velocity', self.velocities, MAX_VELOCITY, 'rad/s')
+            if self.velocities[-1].any():
+                raise InvalidCommand(
+                    f'the last velocity must be 0 rad/s, got {self.velocities[-1]}'
+                )
+        self._lock_optional('anchor_time', self.anchor_time, (), 's')
+        self._lock_optional('anchor_effort', self.anchor_effort, efforts.shape[1:], 'N m')
+
+    @property
+    def end(self) -> float:
+        """Return the absolute time of the last point [s]."""
+        return self.start + float(self.times[-1])
+
+    @property
+    def motors(self) -> int:
+        """Return the number n-1 of actuated joints."""
+        return int(self.efforts.shape[1])
+
+    def taken_over(self, at: float, effort: npt.ArrayLike) -> 'EffortProfile':
+        """Return a copy that starts from an effort (n-1,) [N m] applied at a time [s]."""
+        return replace(self, anchor_time=at, anchor_effort=np.asarray(effort, dtype=float))
+
+    def effort(self, t: float) -> Array:
+        """Return the effort at an absolute time [s], shape (n-1,) [N m]."""
+        course, elapsed = self._course, t - self.start
+        i = bisect_right(course.times, elapsed) - 1
+        if i < 0:
+            return self._before
+        effort: Array = course.efforts[i] + course.slopes[i] * (elapsed - course.times[i])
+        return effort
+
+    def reference(self, t: float) -> JointReference:
+        """
+        Return effort, position and velocity at an absolute time [s].
+
+        The first position is held before the first point, the last one after the end. Positions
+        without velocities are joined linearly.
+        """
+        effort = self.effort(t)
+        if self._motion is None:
+            missing = np.full(self.motors, np.nan)
+            return JointReference(effort, missing, missing)
+        return JointReference(effort, *self._motion.at(t - self.start))
+
+    def _lock_optional(
+        self, name: str, value: npt.ArrayLike | None, shape: tuple[int, ...], unit: str
+    ) -> None:
+        """Lock a field that may be missing."""
+        if value is None:
+            return
+        array = locked(name, value, unit)
+        if array.shape != shape:
+            raise InvalidCommand(f'{name} must have shape {shape}, got {array.shape}')
+        object.__setattr__(self, name, array if shape else float(array))
+
+    @cached_property
+    def _before(self) -> Array:
+        """Effort before the first knot."""
+        return np.zeros(self.motors) if self.anchor_effort is None else self.anchor_effort
+
+    @cached_property
+    def _motion(self) -> SampledMotion | None:
+        """Where the arm should be, if that is commanded."""
+        if self.positions is None:
+            return None
+        return SampledMotion(self.times, self.positions, self.velocities)
+
+    @cached_property
+    def _course(self) -> _Course:
+        """Knots of the effort, the anchor among them if it precedes the first point."""
+        times, efforts = self.times, self.efforts
+        anchor = 0.0 if self.anchor_time is None else self.anchor_time - self.start
+        if anchor < times[0]:
+            times, efforts = np.append(anchor, times), np.vstack((self._before, efforts))
+        slopes = np.diff(efforts, axis=0) / np.diff(times)[:, None]
+        return _Course(times.tolist(), efforts, np.vstack((slopes, np.zeros(self.motors))))
+
+
+def locked(name: str, value: npt.ArrayLike, unit: str) -> Array:
+    """Return a locked copy of finite numbers."""
+    array = np.array(value, dtype=float, order='C')
+    if not np.isfinite(array).all():
+        raise InvalidCommand(f'{name} must be finite, got a value that is not [{unit}]')
+    array.setflags(write=False)
+    return array
+
+
+def check_bound(name: str, values: Array, bound: float, unit: str) -> None:
+    """Refuse numbers that no robot has to do with."""
+    largest = float(np.abs(values).max())
+    if largest > bound:
+        raise InvalidCommand(f'{name} of {largest:.3g} {unit} is beyond {bound:g} {unit}')

@@ -1,0 +1,77 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is simulated, how it is sampled, and what it lets itself be told."""
+
+from dataclasses import dataclass, field
+from math import ceil, isfinite
+
+from flat_planner_ros.core.arm import InvalidModel, PlanarArm
+from flat_planner_ros.core.plant.sensing import Sensing
+from flat_planner_ros.core.plant.simulation import GRID_TOLERANCE
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationSettings:
+    """
+    What is simulated, and how it is sampled.
+
+    Attributes
+    ----------
+    arm
+        The arm as it is.
+    position
+        Joint angles at rest at the start and after a reset [rad].
+    rate
+        Samples per second of simulated time [Hz].
+    step
+        Longest integration step [s]; the step taken divides the time between samples.
+    saturation, feedback_p, feedback_d
+        As in SimulatedArm.
+    sensing
+        Imperfections of the sensors.
+    start_tolerance
+        Largest distance of a command's present position from the arm's, or from that of the
+        command it takes the place of [rad]; infinite for any.
+    input_timeout
+        Time for which an effort without a command is applied at most [s].
+
+    """
+
+    arm: PlanarArm
+    position: tuple[float, ...]
+    rate: float = 200.0
+    step: float = 1e-3
+    saturation: tuple[float, ...] | None = None
+    feedback_p: tuple[float, ...] | None = None
+    feedback_d: tuple[float, ...] | None = None
+    sensing: Sensing = field(default_factory=Sensing)
+    start_tolerance: float = 0.05
+    input_timeout: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse times without meaning."""
+        for name, unit in {'rate': 'Hz', 'step': 's', 'input_timeout': 's'}.items():
+            value = getattr(self, name)
+            if not (isfinite(value) and value > 0.0):
+                raise InvalidModel(f'{name} must be finite and above 0 {unit}, got {value}')
+        if not self.start_tolerance >= 0.0:
+            raise InvalidModel(
+                f'start_tolerance must be at least 0 rad, got {self.start_tolerance}'
+            )
+
+    @property
+    def steps_per_sample(self) -> int:
+        """Return the number of integration steps from one sample to the next."""
+        return max(1, ceil(1.0 / (self.rate * self.step) - GRID_TOLERANCE))

@@ -1,0 +1,35 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Session: goals and measurements in, motions and verdicts out, in the order of time."""
+
+from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint, rest_target
+from flat_planner_ros.core.session.session import Ended, Outcome, PlannerSession
+from flat_planner_ros.core.session.settings import SessionSettings, StartSource
+from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
+
+__all__ = [
+    'check_point_count',
+    'Ended',
+    'Goal',
+    'GoalPoint',
+    'Motion',
+    'Outcome',
+    'PlannerSession',
+    'rest_target',
+    'SessionSettings',
+    'StartSource',
+    'Timeline',
+    'Track',
+]

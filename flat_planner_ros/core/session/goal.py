@@ -1,0 +1,314 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Goals as users send them, and the rules that an admissible one obeys (docs/interfaces.md)."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import NamedTuple
+
+from flat_planner_ros.core.planning import Reason, RequestRejected
+
+MAX_ANGLE = 1e6
+"""Largest joint angle of a goal [rad]: beyond, a motion drowns in the rounding of its position."""
+
+MAX_POINTS = 51
+"""Most points of a goal: 50 via points and the final one."""
+
+MAX_NAME = 64
+"""Characters of a foreign name that a message repeats."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalPoint:
+    """
+    One point of a goal; entries follow the goal's joint names.
+
+    Attributes
+    ----------
+    time
+        From the start of the motion [s]; 0 when the planner is to choose.
+    positions, velocities, accelerations, effort
+        [rad, rad/s, rad/s^2, N m]; empty where not given.
+
+    """
+
+    time: float
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] = ()
+    accelerations: tuple[float, ...] = ()
+    effort: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """
+    A request as received, not yet checked.
+
+    Attributes
+    ----------
+    joint_names
+        In any order.
+    points
+        Via points and, last, the final pose at rest.
+    stamp
+        Absolute time of the start [s]; None for as soon as possible.
+
+    """
+
+    joint_names: tuple[str, ...]
+    points: tuple[GoalPoint, ...]
+    stamp: float | None = None
+
+
+class Waypoint(NamedTuple):
+    """
+    Where a motion passes.
+
+    Attributes
+    ----------
+    positions
+        Angles in kinematic order, the passive joint last and zero [rad].
+    time
+        From the start of the motion [s]; None when the planner is to choose.
+
+    """
+
+    positions: tuple[float, ...]
+    time: float | None
+
+
+class RestTarget(NamedTuple):
+    """
+    What an admissible goal asks for.
+
+    Attributes
+    ----------
+    positions
+        Final angles in kinematic order, the passive joint last and zero [rad].
+    duration
+        Prescribed time of the motion [s]; None when the planner is to choose.
+    via
+        Points to pass on the way, in the order of time.
+
+    """
+
+    positions: tuple[float, ...]
+    duration: float | None
+    via: tuple[Waypoint, ...] = ()
+
+    @property
+    def chooses_times(self) -> bool:
+        """Whether there are via points whose times the planner is to choose."""
+        return bool(self.via) and self.duration is None
+
+
+def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
+    """
+    Return the target of a goal that obeys every rule.
+
+    Parameters
+    ----------
+    goal
+        The request.
+    joints
+        The arm's joints in kinematic order, the passive one last.
+
+    Raises
+    ------
+    RequestRejected
+        The first rule that the goal breaks, with joint, value and limit.
+
+    """
+    _check_joints(goal, joints)
+    for index, point in enumerate(goal.points):
+        _check_point(goal, index, point)
+    duration = _checked_duration(goal)
+    for point in goal.points[:-1]:
+        _check_only_passed(goal, point)
+    _check_rest(goal, goal.points[-1])
+    *via, final = (_angles(goal, point, joints) for point in goal.points)
+    if duration is None:
+        return RestTarget(final, None, tuple(Waypoint(angles, None) for angles in via))
+    times = (point.time for point in goal.points)
+    return RestTarget(final, duration, tuple(map(Waypoint, via, times)))
+
+
+def check_point_count(count: int) -> None:
+    """Refuse more points than any goal may have."""
+    if count > MAX_POINTS:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal has {count} points, more than {MAX_POINTS}',
+            value=float(count),
+            limit=float(MAX_POINTS),
+        )
+
+
+def _check_joints(goal: Goal, joints: Sequence[str]) -> None:
+    """Refuse an empty goal and names that are not each actuated joint once."""
+    if not goal.joint_names or not goal.points:
+        missing = 'joint names' if not goal.joint_names else 'points'
+        raise RequestRejected(Reason.EMPTY_GOAL, f'the goal has no {missing}')
+    check_point_count(len(goal.points))
+    known = ', '.join(joints)
+    for name, count in Counter(goal.joint_names).items():
+        if name not in joints:
+            problem = f'unknown joint {name[:MAX_NAME]!r}'
+        elif count > 1:
+            problem = f'joint {name!r} occurs {count} times'
+        else:
+            continue
+        raise RequestRejected(
+            Reason.INVALID_JOINTS, f'{problem}; the arm has {known}', joint=name[:MAX_NAME]
+        )
+    for name in joints[:-1]:
+        if name not in goal.joint_names:
+            raise RequestRejected(
+                Reason.INVALID_JOINTS,
+                f'the actuated joint {name!r} is missing; the arm has {known}',
+                joint=name,
+            )
+
+
+def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
+    """Refuse wrong sizes, efforts, and numbers that no motion could reach."""
+    count = len(goal.joint_names)
+    if point.effort:
+        raise RequestRejected(
+            Reason.EFFORT_NOT_ALLOWED,
+            f'point {index} has {len(point.effort)} efforts; leave them out, the planner computes '
+            f'them',
+            value=float(len(point.effort)),
+            limit=0.0,
+            time=point.time,
+        )
+    for quantity, values in (
+        ('positions', point.positions),
+        ('velocities', point.velocities),
+        ('accelerations', point.accelerations),
+    ):
+        if len(values) != count and (values or quantity == 'positions'):
+            raise RequestRejected(
+                Reason.SIZE_MISMATCH,
+                f'point {index} has {len(values)} {quantity} for {count} joints',
+                value=float(len(values)),
+                limit=float(count),
+                time=point.time,
+            )
+        for name, value in zip(goal.joint_names, values, strict=False):
+            if not isfinite(value):
+                raise RequestRejected(
+                    Reason.NON_FINITE,
+                    f'{quantity} of {name} in point {index} are not finite: {value}',
+                    joint=name,
+                    value=value,
+                    time=point.time,
+                )
+    for name, value in zip(goal.joint_names, point.positions, strict=True):
+        if abs(value) > MAX_ANGLE:
+            raise RequestRejected(
+                Reason.POSITION_LIMIT,
+                f'position {value:g} rad of {name} in point {index} exceeds {MAX_ANGLE:g} rad',
+                joint=name,
+                value=value,
+                limit=MAX_ANGLE,
+                time=point.time,
+            )
+
+
+def _check_rest(goal: Goal, final: GoalPoint) -> None:
+    """Refuse an end in motion."""
+    for quantity, name, value in _moving(goal, final):
+        raise RequestRejected(
+            Reason.NONZERO_END_STATE,
+            f'the motion must end at rest, but the final {quantity} of {name} is {value:g}; '
+            f'leave it out or set it to 0',
+            joint=name,
+            value=value,
+            limit=0.0,
+        )
+
+
+def _check_only_passed(goal: Goal, point: GoalPoint) -> None:
+    """Refuse velocities and accelerations of via points, which the planner chooses."""
+    for quantity, name, value in _moving(goal, point):
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'via points prescribe positions only, but there the {quantity} of {name} is '
+            f'{value:g}; leave it out, the planner chooses it',
+            joint=name,
+            value=value,
+            limit=0.0,
+            time=point.time,
+        )
+
+
+def _moving(goal: Goal, point: GoalPoint) -> Iterator[tuple[str, str, float]]:
+    """Yield the quantity, joint and value of every derivative of a point that is not zero."""
+    for quantity, values in (
+        ('velocity', point.velocities),
+        ('acceleration', point.accelerations),
+    ):
+        for name, value in zip(goal.joint_names, values, strict=False):
+            if value != 0.0:
+                yield quantity, name, value
+
+
+def _angles(goal: Goal, point: GoalPoint, joints: Sequence[str]) -> tuple[float, ...]:
+    """Return a point's angles in kinematic order; refuse a loaded spring."""
+    angles = dict(zip(goal.joint_names, point.positions, strict=True))
+    passive = joints[-1]
+    if angles.setdefault(passive, 0.0) != 0.0:
+        place = 'final position' if point is goal.points[-1] else 'position in a via point'
+        raise RequestRejected(
+            Reason.PASSIVE_JOINT_NOT_ZERO,
+            f'the spring of {passive} holds no angle that could be asked for: its {place} must '
+            f'be 0 rad, got {angles[passive]:g} rad',
+            joint=passive,
+            value=angles[passive],
+            limit=0.0,
+            time=point.time,
+        )
+    return tuple(angles[name] for name in joints)
+
+
+def _checked_duration(goal: Goal) -> float | None:
+    """Return the prescribed duration, None for an automatic one."""
+    times = [point.time for point in goal.points]
+    if not any(times):
+        return None
+    previous = 0.0
+    for index, time in enumerate(times):
+        if time == 0.0:
+            raise RequestRejected(
+                Reason.TIME_NOT_INCREASING,
+                f'time_from_start is zero in point {index}, but not in all points',
+                value=time,
+                limit=previous,
+                time=time,
+            )
+        if not time > previous:
+            raise RequestRejected(
+                Reason.TIME_NOT_INCREASING,
+                f'time_from_start must be zero in all points or increase from above zero, but '
+                f'point {index} has {time:g} s after {previous:g} s',
+                value=time,
+                limit=previous,
+                time=time,
+            )
+        previous = time
+    return times[-1]

@@ -1,0 +1,202 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Settings of a planning session: the arm, what is minimised, and what is accepted."""
+
+from dataclasses import dataclass
+from enum import Enum
+from math import inf
+
+from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
+from flat_planner_ros.core.planning import (
+    JointLimits,
+    OnViolation,
+    PlanningOptions,
+    Reason,
+    RequestRejected,
+    Timing,
+)
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LONGEST_FOUND = 3600.0
+"""Longest duration that is looked for where the settings name none [s]."""
+
+
+class StartSource(Enum):
+    """Where the start of a motion is taken from."""
+
+    AUTO = 'auto'
+    """The measured state, unless another motion is under way or waits for its start."""
+
+    MEASURED = 'measured'
+    """The measured state of the actuated joints, the elastic one relaxed."""
+
+    REFERENCE = 'reference'
+    """The end of the last motion, checked against a measured state if there is one."""
+
+    PARAMETER = 'parameter'
+    """A given position, checked against a measured state if there is one."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SessionSettings:
+    """
+    Everything a session needs to know; may be replaced between goals.
+
+    Attributes
+    ----------
+    joints
+        Names in kinematic order, the passive one last.
+    arm, options
+        Nominal model and what is minimised.
+    period
+        Spacing of a motion's samples [s].
+    default_duration
+        Duration of goals without times [s]; 0 for the shortest within the limits.
+    min_duration, max_duration
+        Range of durations that are accepted [s].
+    limits
+        What the joints may do; None where nothing is limited.
+    on_violation
+        What becomes of durations that are too short for them.
+    start_source
+        Where motions start.
+    start_position
+        Start for the source `parameter`, shape (n,) [rad].
+    position_tolerance, velocity_tolerance
+        Largest deviation of a measured start from rest at the planned one [rad, rad/s].
+    measurement_timeout
+        Age from which a measurement is stale [s].
+    start_delay
+        From accepting a goal without a stamp to its start, at rest [s].
+    lookahead
+        The same while another motion is under way or waits for its start [s].
+    replan_tolerance
+        Largest distance of a measured actuated joint from what was planned for that time at which
+        another motion may take over [rad]; 0 for any.
+    is_stamped
+        Whether the executor plays a command at its stamp; if it plays on arrival, no motion can
+        take over from another.
+    execute
+        Whether motions are carried out; if not, none keeps the session busy.
+
+    """
+
+    joints: tuple[str, ...]
+    arm: PlanarArm
+    options: PlanningOptions
+    period: float = 0.005
+    default_duration: float = 0.0
+    min_duration: float = 0.0
+    max_duration: float = inf
+    limits: JointLimits | None = None
+    on_violation: OnViolation = OnViolation.REJECT
+    start_source: StartSource = StartSource.AUTO
+    start_position: tuple[float, ...] = ()
+    position_tolerance: float = 0.01
+    velocity_tolerance: float = 0.1
+    measurement_timeout: float = 0.5
+    start_delay: float = 0.05
+    lookahead: float = 0.1
+    replan_tolerance: float = 0.5
+    is_stamped: bool = True
+    execute: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse settings that contradict each other."""
+        if len(self.joints) != self.arm.n:
+            raise InvalidRequest(
+                f'{len(self.joints)} joint names for an arm of {self.arm.n} joints'
+            )
+        if len(set(self.joints)) != len(self.joints):
+            raise InvalidRequest(f'joint names must differ, got {", ".join(self.joints)}')
+        if self.max_duration < self.min_duration:
+            raise InvalidRequest(
+                f'duration.max = {self.max_duration:g} s is below duration.min = '
+                f'{self.min_duration:g} s'
+            )
+        if self.limits is not None and len(self.limits.velocity) != self.arm.n:
+            raise InvalidRequest(
+                f'limits of {len(self.limits.velocity)} joints for an arm of {self.arm.n} joints'
+            )
+        if self.start_source is StartSource.PARAMETER:
+            if len(self.start_position) != self.arm.n:
+                raise InvalidRequest(
+                    f'start.position needs {self.arm.n} angles, got {len(self.start_position)}'
+                )
+            if self.start_position[-1] != 0.0:
+                raise InvalidRequest(
+                    f'start.position of the passive joint must be 0 rad, got '
+                    f'{self.start_position[-1]:g} rad'
+                )
+
+    def checked_duration(self, prescribed: float | None) -> float | None:
+        """
+        Return the duration of a goal, within its range; None for an automatic one.
+
+        Parameters
+        ----------
+        prescribed
+            By the goal [s]; None where it leaves the choice to the planner.
+
+        Raises
+        ------
+        RequestRejected
+            It is outside the range, or nothing makes one the shortest.
+
+        """
+        duration = self.default_duration if prescribed is None else prescribed
+        if duration == 0.0:
+            if self.limits is None or not self.limits.bound_duration:
+                raise RequestRejected(
+                    Reason.DURATION_OUT_OF_RANGE,
+                    'the goal prescribes no duration, and no limit of a velocity or an effort '
+                    'makes one the shortest: set time_from_start in the goal, or one of the '
+                    'parameters duration.default, limits.velocity and limits.effort',
+                )
+            return None
+        if not self.min_duration <= duration <= self.max_duration:
+            below = duration < self.min_duration
+            limit = self.min_duration if below else self.max_duration
+            raise RequestRejected(
+                Reason.DURATION_OUT_OF_RANGE,
+                f'duration {duration:g} s is outside [{self.min_duration:g}, '
+                f'{self.max_duration:g}] s',
+                value=duration,
+                limit=limit,
+            )
+        return duration
+
+    def timing(self, start: FloatArray) -> Timing:
+        """
+        Return the rules for the duration of a motion.
+
+        Parameters
+        ----------
+        start
+            Pose that it starts from, shape (n,) [rad].
+
+        """
+        limits = self.limits or JointLimits.of(self.arm.n)
+        return Timing(
+            joints=self.joints,
+            limits=limits.reaching(start, self.position_tolerance),
+            on_violation=self.on_violation,
+            # A motion shorter than the spacing of its samples would be none.
+            shortest=max(self.min_duration, self.period),
+            longest=min(self.max_duration, LONGEST_FOUND),
+        )

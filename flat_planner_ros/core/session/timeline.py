@@ -1,0 +1,209 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Timeline: the motions that are still to be carried out, and the one command that states them all.
+
+A goal replaces whatever was planned from its start on. The start of the new motion is the state
+that the old one plans for that time, so that the effort has no step, and what is left of the old
+one until then is sent along with the new one: an executor that skips past points cannot notice the
+seam (docs/derivation.md, section S).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from flat_planner_ros.core.planning import LimitUse, Plan, PlanSamples, Strategy
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+SEAM_TOLERANCE = 1e-6
+"""Points of an old motion this close to the start of the next one give way to its first [s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """
+    A plan with its place in time.
+
+    Attributes
+    ----------
+    plan_id
+        Counts the accepted goals from 1.
+    plan
+        What is carried out.
+    samples
+        The plan on the command's grid.
+    start
+        Absolute time of its start [s].
+    planned_at
+        Absolute time at which it was accepted [s].
+    cut
+        Absolute time at which another motion takes over [s]; None if none does.
+    stops
+        Whether it brings a motion of the same number to rest early.
+    duration_min
+        Shortest duration within the limits, where it was looked for [s].
+    exceeded
+        What the prescribed duration would have exceeded, if the motion was stretched.
+    replaced_strategy
+        The strategy that was asked for, where the plan had to take another one.
+
+    """
+
+    plan_id: int
+    plan: Plan
+    samples: PlanSamples
+    start: float
+    planned_at: float
+    cut: float | None = None
+    stops: bool = False
+    duration_min: float | None = None
+    exceeded: LimitUse | None = None
+    replaced_strategy: Strategy | None = None
+
+    @property
+    def end(self) -> float:
+        """Return the absolute time from which it has no say [s]."""
+        return self.start + self.plan.duration if self.cut is None else self.cut
+
+    def reference(self, now: float) -> PlanSamples:
+        """Return what is planned at an absolute time, at rest before and after; one sample."""
+        return self.plan.at(np.array([now - self.start]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Track:
+    """
+    What an executor is sent: a table of points from an absolute time on.
+
+    Attributes
+    ----------
+    start
+        Absolute time of the first point [s].
+    times
+        Of the points from the start, strictly increasing from 0, shape (m,) [s].
+    positions, velocities, accelerations, efforts
+        Of all joints, shape (m, n) [rad, rad/s, rad/s^2, N m].
+    flat
+        Derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k].
+
+    """
+
+    start: float
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray
+    accelerations: FloatArray
+    efforts: FloatArray
+    flat: FloatArray
+
+
+class Timeline:
+    """
+    Motions in the order of time, each until its own end or until the next one takes over.
+
+    Parameters
+    ----------
+    motions
+        None overlaps another.
+
+    """
+
+    def __init__(self, motions: Sequence[Motion] = ()) -> None:
+        """Keep the motions."""
+        self.motions = tuple(motions)
+
+    @property
+    def last(self) -> Motion | None:
+        """Return the motion that ends last."""
+        return self.motions[-1] if self.motions else None
+
+    def is_busy(self, now: float) -> bool:
+        """Tell whether anything is still to be carried out."""
+        return self.last is not None and now < self.last.end
+
+    def at(self, time: float) -> Motion | None:
+        """Return the motion in force at a time: the last one that has started, else the first."""
+        started = [motion for motion in self.motions if motion.start <= time]
+        return started[-1] if started else next(iter(self.motions), None)
+
+    def seam(self, time: float) -> float:
+        """Return the first time from a given one on at which another motion may take over."""
+        motion = self.at(time)
+        if motion is None or not motion.start < time < motion.end:
+            return time
+        # A point that is sent anyway, so that the spacing of points stays what it is.
+        times = motion.samples.times
+        index = int(np.searchsorted(times, time - motion.start))
+        return motion.start + float(times[index])
+
+    def after(self, now: float) -> 'Timeline':
+        """Return the timeline without what has come to its end."""
+        return Timeline([motion for motion in self.motions if now < motion.end])
+
+    def with_motion(self, motion: Motion) -> 'Timeline':
+        """Return the timeline in which a motion replaces all that was planned from its start."""
+        kept = [
+            replace(old, cut=motion.start) if motion.start < old.end else old
+            for old in self.motions
+            if old.start < motion.start
+        ]
+        return Timeline([*kept, motion])
+
+    def moves(self, since: float, until: float) -> bool:
+        """Tell whether any motion is planned for part of a time [s]."""
+        return any(motion.start < until and since < motion.end for motion in self.motions)
+
+    def replaced(self, time: float) -> list[Motion]:
+        """Return the motions that would not come to their end if another one started then."""
+        return [motion for motion in self.motions if time < motion.end]
+
+    def track(self, now: float) -> Track:
+        """
+        Return the points of all that is still to be carried out.
+
+        Begins at the last point that is not after the present one or, if nothing has begun, with
+        the first motion.
+        """
+        left = self.after(now).motions or self.motions[-1:]
+        first = left[0]
+        begun = int(np.searchsorted(first.samples.times, now - first.start, side='right')) - 1
+        # Later points stay on the old grid to the last bit: what is being played does not change.
+        origin = float(first.samples.times[max(begun, 0)])
+        start = first.start + origin
+        pieces = []
+        for motion, after in zip(left, [*left[1:], None], strict=True):
+            until = np.inf if after is None else after.start - SEAM_TOLERANCE - motion.start
+            end = int(np.searchsorted(motion.samples.times, until))
+            pieces.append((motion.samples, slice(max(begun, 0) if motion is first else 0, end)))
+        shifts = [-origin, *(motion.start - start for motion in left[1:])]
+        return Track(
+            start=start,
+            times=np.concatenate(
+                [
+                    samples.times[chosen] + shift
+                    for (samples, chosen), shift in zip(pieces, shifts, strict=True)
+                ]
+            ),
+            flat=np.concatenate([samples.flat[:, :, chosen] for samples, chosen in pieces], 2),
+            **{
+                name: np.concatenate(
+                    [getattr(samples, name)[chosen] for samples, chosen in pieces]
+                )
+                for name in ('positions', 'velocities', 'accelerations', 'efforts')
+            },
+        )

@@ -1,0 +1,142 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A motion and what it left behind, drawn with matplotlib (extra `plot`)."""
+
+from pathlib import Path
+from textwrap import fill
+
+from flat_planner_ros.core.monitor import PlannedMotion, VibrationReport
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+MILLI = 1e3
+"""Residuals are drawn in mrad."""
+
+LONGEST_STEP = 0.03
+"""Time between two joint states that a line bridges [s]."""
+
+TITLE_WIDTH = 110
+"""Characters in a line of the title."""
+
+
+def draw(
+    report: VibrationReport,
+    motion: PlannedMotion,
+    times: FloatArray,
+    positions: FloatArray,
+    efforts: FloatArray,
+    path: Path,
+) -> None:
+    """
+    Draw planned and measured positions, the residual with its fitted envelope, and efforts.
+
+    Parameters
+    ----------
+    report, motion
+        The verdict and what it is about.
+    times
+        Of the samples [s], shape (m,).
+    positions, efforts
+        Measured [rad], [N m], shape (m, n); NaN where unknown.
+    path
+        File to write; its suffix chooses the format.
+
+    Raises
+    ------
+    ImportError
+        matplotlib is not installed.
+
+    """
+    from flat_planner_ros.figures.file_plot import plt
+
+    elapsed = times - motion.start
+    end = motion.end - motion.start
+    last = max(end + report.window, float(elapsed[-1]) if elapsed.size else end)
+    planned = np.array([motion.reference(time)[0] for time in times]).reshape(positions.shape)
+    figure, axes = plt.subplots(3, 1, figsize=(9.0, 9.0), sharex=True, layout='constrained')
+    _draw_positions(axes[0], motion, elapsed, positions, last)
+    _draw_residual(axes[1], report, elapsed, MILLI * (positions - planned), end)
+    _draw_efforts(axes[2], motion, elapsed, efforts)
+    for axis in axes:
+        axis.axvline(0.0, color='black', linewidth=0.6)
+        axis.axvline(end, color='black', linewidth=0.6)
+        axis.grid(alpha=0.3)
+        axis.margins(x=0.01)
+    axes[-1].set_xlabel('time from the start of the motion [s]')
+    figure.suptitle(_title(report), fontsize=10)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def _draw_positions(
+    axis, motion: PlannedMotion, elapsed: FloatArray, positions: FloatArray, last: float
+) -> None:
+    """Draw each joint as planned and as measured."""
+    times = np.append(motion.times, last)
+    planned = np.vstack([motion.positions, motion.final])
+    for joint, name in enumerate(motion.joint_names):
+        colour = f'C{joint}'
+        _plot(axis, elapsed, positions[:, joint], color=colour, label=f'{name} measured')
+        axis.plot(times, planned[:, joint], '--', color='black', linewidth=0.9)
+    axis.plot([], [], '--', color='black', linewidth=0.9, label='planned')
+    axis.set_ylabel('position [rad]')
+    axis.legend(loc='best', fontsize=8)
+
+
+def _draw_residual(
+    axis, report: VibrationReport, elapsed: FloatArray, residual: FloatArray, end: float
+) -> None:
+    """Draw how far each joint is from the plan, and the envelope fitted after the motion."""
+    for joint, name in enumerate(report.joint_names):
+        _plot(axis, elapsed, residual[:, joint], color=f'C{joint}', label=name)
+    fit = report.fit
+    after = elapsed[(elapsed >= end) & (elapsed <= end + report.window)]
+    if None not in (fit.amplitude, fit.decay, fit.bias, fit.drift) and after.size:
+        times = np.linspace(end, after[-1], 200)
+        envelope = fit.amplitude * np.exp(-fit.decay * (times - end))
+        middle = fit.bias + fit.drift * (times - 0.5 * (after[0] + after[-1]))
+        label = f'envelope fitted to {report.joint}'
+        axis.plot(times, MILLI * (middle + envelope), color='C3', linewidth=1.0, label=label)
+        axis.plot(times, MILLI * (middle - envelope), color='C3', linewidth=1.0)
+        axis.plot(end, MILLI * (middle[0] + envelope[0]), 'o', color='C3', markersize=4)
+    axis.set_ylabel('measured − planned [mrad]')
+    axis.legend(loc='best', fontsize=8)
+
+
+def _draw_efforts(axis, motion: PlannedMotion, elapsed: FloatArray, efforts: FloatArray) -> None:
+    """Draw the efforts of the actuated joints."""
+    for joint, name in enumerate(motion.joint_names[:-1]):
+        if np.isfinite(efforts[:, joint]).any():
+            _plot(axis, elapsed, efforts[:, joint], color=f'C{joint}', label=f'{name} measured')
+        if motion.efforts is not None:
+            axis.plot(motion.times, motion.efforts[:, joint], '--', color='black', linewidth=0.9)
+    if motion.efforts is not None:
+        axis.plot([], [], '--', color='black', linewidth=0.9, label='planned')
+    axis.set_ylabel('effort [N m]')
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc='best', fontsize=8)
+
+
+def _plot(axis, times: FloatArray, values: FloatArray, **style: object) -> None:
+    """Draw a line that breaks where samples were lost."""
+    holes = np.flatnonzero(np.diff(times) > LONGEST_STEP) + 1
+    axis.plot(np.insert(times, holes, np.nan), np.insert(values, holes, np.nan), **style)
+
+
+def _title(report: VibrationReport) -> str:
+    """Return the verdict in lines that fit."""
+    return fill(f'{report.level.value.upper()}: {report.message}', TITLE_WIDTH)

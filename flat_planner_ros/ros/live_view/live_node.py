@@ -1,0 +1,396 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Live node: what the graph says, for browsers; what browsers want, for the graph."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from time import monotonic
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest
+from flat_planner_ros.ros.live_view.feed import Feed
+from flat_planner_ros.ros.parameters import planner as planner_parameters
+from flat_planner_ros.ros.parameters import plant as plant_parameters
+from flat_planner_ros.ros.parameters.declaration import InvalidParameter
+from flat_planner_ros.ros.wire import conversions, interfaces
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+LIVE_VIEW = 'flat_live_view'
+"""Name of the node."""
+
+MEASURED, REFERENCE, RESIDUAL = STREAMS = ('measured', 'reference', 'residual')
+"""Names of the streams; a row is the time, positions, velocities and efforts."""
+
+ROW_PERIOD = 0.01
+"""Shortest real time between two rows of a stream [s]; the page shows no more."""
+
+POLL_PERIOD = 1.0
+"""Time between two looks at nodes and parameters [s]."""
+
+PATIENCE = 5.0
+"""Longest wait for the answer of a node [s]."""
+
+BACKWARD = 0.5
+"""Backward step of the stamps from which another time has begun [s]."""
+
+VERDICTS = 20
+"""Verdicts that are kept [-]."""
+
+TEXT_LIMIT = 500
+"""Longest text of a message that is shown [characters]."""
+
+NODES = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
+
+SETTINGS = {
+    interfaces.PLANNER: ('strategy', 'flat_model', 'weights.r', 'weights.p', 'auto_tune'),
+    interfaces.PLANT: (
+        'mismatch.stiffness_scale',
+        'mismatch.damping_scale',
+        'mismatch.inertia_scale',
+    ),
+}
+"""Parameters that the page shows and sets."""
+
+ROWS = {
+    interfaces.PLANNER: {row.name: row for row in planner_parameters.ROWS},
+    interfaces.PLANT: {row.name: row for row in plant_parameters.ROWS},
+}
+"""What they may be."""
+
+SERVICES = {
+    'replan': interfaces.of(interfaces.PLANNER, interfaces.REPLAN),
+    'stop': interfaces.of(interfaces.PLANNER, interfaces.STOP),
+    'adopt': interfaces.of(interfaces.PLANNER, interfaces.ADOPT),
+    'reset': interfaces.of(interfaces.PLANT, interfaces.RESET),
+}
+"""Services that the page calls, by the names of its buttons."""
+
+LEVELS = {
+    DiagnosticStatus.OK: 'ok',
+    DiagnosticStatus.WARN: 'warn',
+    DiagnosticStatus.ERROR: 'error',
+    DiagnosticStatus.STALE: 'stale',
+}
+
+
+class LiveNode(Node):
+    """
+    Feeds browsers and carries out what they ask for.
+
+    Parameters
+    ----------
+    options
+        As for `rclpy.node.Node`.
+
+    Attributes
+    ----------
+    feed
+        What browsers are to be told.
+
+    """
+
+    def __init__(self, **options: object) -> None:
+        """Open the interface."""
+        super().__init__(LIVE_VIEW, **options)
+        self.feed = Feed(STREAMS)
+        self.feed.put('namespace', self.get_namespace())
+        self.feed.put('choices', _choices())
+        self._joints: list[str] = []
+        self._reader: conversions.JointStateReader | None = None
+        self._epoch: float | None = None
+        self._last = dict.fromkeys(STREAMS, 0.0)
+        self._verdicts: deque[dict[str, Any]] = deque(maxlen=VERDICTS)
+        self._asked: dict[str, float] = {}
+        self._listen()
+        self._goals = self.create_publisher(
+            JointTrajectory,
+            interfaces.of(interfaces.PLANNER, interfaces.GOAL),
+            interfaces.RELIABLE,
+        )
+        self._triggers = {
+            name: self.create_client(Trigger, service) for name, service in SERVICES.items()
+        }
+        self._parameter_clients = {name: AsyncParameterClient(self, name) for name in NODES}
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(POLL_PERIOD, self._on_poll, clock=steady)
+
+    async def obey(self, command: Any) -> tuple[bool, str]:
+        """
+        Carry out a browser's command; may be awaited in any thread's event loop.
+
+        Returns
+        -------
+        tuple
+            Whether it was carried out, and a sentence on it.
+
+        """
+        answer: Future[tuple[bool, str]] = Future()
+
+        async def act() -> None:
+            try:
+                answer.set_result(await self._carry_out(command))
+            except FlatPlannerError as error:
+                answer.set_result((False, str(error)))
+            except Exception as error:  # noqa: BLE001  The browser waits for an answer.
+                answer.set_result((False, f'internal error: {error!r}'))
+
+        if self.executor is None:
+            return False, 'the live view is starting or ending'
+        self.executor.create_task(act())
+        try:
+            return await asyncio.wait_for(asyncio.wrap_future(answer), PATIENCE)
+        except asyncio.TimeoutError:  # noqa: UP041  Another class on Python 3.10.
+            return False, f'no answer within {PATIENCE:g} s'
+
+    def _listen(self) -> None:
+        """Subscribe to all that the page shows."""
+        planner, monitor, of = interfaces.PLANNER, interfaces.MONITOR, interfaces.of
+        latched, history = interfaces.LATCHED, interfaces.LATCHED_HISTORY
+        for stream, topic in (
+            (MEASURED, interfaces.JOINT_STATES),
+            (REFERENCE, of(planner, interfaces.REFERENCE)),
+            (RESIDUAL, of(monitor, interfaces.RESIDUAL)),
+        ):
+            self.create_subscription(
+                JointState, topic, self._receiver(stream), interfaces.SENSOR_DATA, raw=True
+            )
+        for kind, topic, take, quality in (
+            (JointTrajectory, of(planner, interfaces.PLAN), self._on_plan, latched),
+            (DiagnosticArray, of(planner, interfaces.STATUS), self._on_status, history),
+            (DiagnosticArray, of(monitor, interfaces.REPORT), self._on_report, latched),
+        ):
+            self.create_subscription(kind, topic, take, quality)
+
+    def _receiver(self, stream: str) -> Callable[[bytes], None]:
+        """Return the callback of a stream, which reads only what will be shown."""
+
+        def receive(data: bytes) -> None:
+            now = monotonic()
+            if now - self._last[stream] >= ROW_PERIOD:
+                self._last[stream] = now
+                self._on_state(stream, deserialize_message(data, JointState))
+
+        return receive
+
+    def _on_state(self, stream: str, msg: JointState) -> None:
+        """Add a row: time, positions, velocities and efforts, NaN where unknown."""
+        if not conversions.is_stamped(msg):
+            msg.header.stamp = self.get_clock().now().to_msg()
+        if not self._joints:
+            self._use_joints(msg.name)
+        try:
+            sample = self._reader.read(msg)
+        except FlatPlannerError:
+            return
+        time = self._relative(sample.time)
+        unknown = [float('nan')] * len(self._joints)
+        values = (sample.positions, sample.velocities, sample.efforts)
+        row = [time]
+        for array in values:
+            row += unknown if array is None else array.tolist()
+        self.feed.append(stream, row)
+
+    def _on_plan(self, msg: JointTrajectory) -> None:
+        """Tell when a motion is, and where it ends."""
+        try:
+            motion = conversions.planned_motion_from_trajectory(msg)
+        except FlatPlannerError:
+            return
+        if tuple(self._joints) != motion.joint_names:
+            self._use_joints(motion.joint_names)
+        plan = {
+            'start': self._relative(motion.start),
+            'end': self._relative(motion.end),
+            'final': motion.final.tolist(),
+        }
+        self.feed.put('plan', plan)
+
+    def _on_status(self, msg: DiagnosticArray) -> None:
+        """Tell a verdict."""
+        for status in msg.status:
+            self._verdicts.appendleft(
+                {
+                    'time': conversions.seconds(msg.header.stamp),
+                    'level': LEVELS.get(status.level, 'stale'),
+                    'state': _values(status).get('state', ''),
+                    'text': status.message[:TEXT_LIMIT],
+                }
+            )
+        self.feed.put('verdicts', list(self._verdicts))
+
+    def _on_report(self, msg: DiagnosticArray) -> None:
+        """Tell what a motion has left."""
+        for status in msg.status:
+            values = _values(status)
+            start, end = values.get('start_time'), values.get('end_time')
+            report = {
+                'level': LEVELS.get(status.level, 'stale'),
+                'text': status.message[:TEXT_LIMIT],
+                'values': values,
+                'start': None if start is None else self._relative(float(start)),
+                'end': None if end is None else self._relative(float(end)),
+            }
+            self.feed.put('report', report)
+
+    def _use_joints(self, names: Sequence[str]) -> None:
+        """Show these joints from now on."""
+        self._joints = list(names)
+        self._reader = conversions.JointStateReader(self._joints)
+        self.feed.restart()
+        self.feed.put('joints', list(names))
+
+    def _relative(self, time: float) -> float:
+        """Return a time from the origin of the page's axis, a new one if time has gone back."""
+        if self._epoch is None or time < self._epoch - BACKWARD:
+            self._epoch = time
+            self.feed.restart()
+        return round(time - self._epoch, 6)
+
+    def _on_poll(self) -> None:
+        """See which nodes are there and what their parameters are."""
+        ready = {
+            name: client.services_are_ready() for name, client in self._parameter_clients.items()
+        }
+        self.feed.put('nodes', ready)
+        for node in SETTINGS:
+            is_asked = monotonic() - self._asked.get(node, -PATIENCE) < PATIENCE
+            if not ready[node]:
+                self._asked.pop(node, None)
+                self.feed.put(f'settings of {node}', None)
+            elif not is_asked and self.executor is not None:
+                self._asked[node] = monotonic()
+                self.executor.create_task(self._ask(node))
+
+    async def _ask(self, node: str) -> None:
+        """Tell the parameters of a node."""
+        client, names = self._parameter_clients[node], SETTINGS[node]
+        values = (await client.get_parameters(list(names))).values
+        known = dict(zip(names, map(parameter_value_to_python, values), strict=False))
+        self.feed.put(f'settings of {node}', known)
+        if node == interfaces.PLANNER:
+            lengths = (await client.get_parameters(['model.link_length'])).values
+            # Empty where the model is reduced: it has no lengths for the last two links.
+            self.feed.put('links', [list(value.double_array_value) for value in lengths][:1])
+        self._asked.pop(node, None)
+
+    async def _carry_out(self, command: Any) -> tuple[bool, str]:
+        """Do what a browser asks for."""
+        if not isinstance(command, Mapping):
+            raise InvalidRequest('a command is an object')
+        deed = command.get('do')
+        if deed == 'goal':
+            return self._send_goal(command.get('positions'), command.get('duration'))
+        if deed == 'set':
+            return await self._set(command.get('node'), command.get('values'))
+        if deed == 'call':
+            return await self._call(command.get('service'))
+        raise InvalidRequest(f'unknown command {str(deed)[:TEXT_LIMIT]!r}')
+
+    def _send_goal(self, positions: Any, duration: Any) -> tuple[bool, str]:
+        """Publish a goal for the actuated joints."""
+        joints = self._joints[:-1]
+        if not joints:
+            raise InvalidRequest('the joints are not known yet: no joint states, no plan')
+        if not isinstance(positions, list) or len(positions) != len(joints):
+            raise InvalidRequest(f'a goal needs {len(joints)} positions, {", ".join(joints)}')
+        if not self._goals.get_subscription_count():
+            raise InvalidRequest('no planner is there to hear the goal')
+        time = conversions.duration_msg(_number(duration, 'duration', lower=0.0, upper=1e6))
+        point = JointTrajectoryPoint(
+            positions=[
+                _number(value, name, lower=-1e9, upper=1e9)
+                for value, name in zip(positions, joints, strict=True)
+            ],
+            time_from_start=time,
+        )
+        self._goals.publish(JointTrajectory(joint_names=joints, points=[point]))
+        return True, 'goal sent'
+
+    async def _set(self, node: Any, values: Any) -> tuple[bool, str]:
+        """Set parameters of a node, one after the other."""
+        if node not in SETTINGS or not isinstance(values, Mapping) or not values:
+            raise InvalidRequest('no such node, or no parameters')
+        client = self._parameter_clients[node]
+        if not client.services_are_ready():
+            raise InvalidRequest(f'{node} is not there')
+        parameters = []
+        for name, value in values.items():
+            if name not in SETTINGS[node]:
+                raise InvalidRequest(f'{str(name)[:TEXT_LIMIT]} cannot be set here')
+            row = ROWS[node][name]
+            if isinstance(row.default, float):
+                value = _number(value, name)
+            elif type(value) is not type(row.default):
+                raise InvalidParameter(f'{name} must be a {type(row.default).__name__}')
+            row.check(value)
+            parameters.append(Parameter(name, value=value))
+        results = (await client.set_parameters(parameters)).results
+        refusals = [result.reason for result in results if not result.successful]
+        await self._ask(node)
+        if refusals:
+            return False, '; '.join(refusals)
+        return True, ', '.join(f'{name} = {value}' for name, value in values.items())
+
+    async def _call(self, service: Any) -> tuple[bool, str]:
+        """Call a service."""
+        if service not in SERVICES:
+            raise InvalidRequest('no such service')
+        client = self._triggers[service]
+        if not client.service_is_ready():
+            raise InvalidRequest(f'{SERVICES[service]} is not there')
+        response = await client.call_async(Trigger.Request())
+        return response.success, response.message
+
+
+def _values(status: DiagnosticStatus) -> dict[str, str]:
+    """Return the values of a status."""
+    return {pair.key: pair.value[:TEXT_LIMIT] for pair in status.values}
+
+
+def _number(
+    value: Any, name: str, *, lower: float = -float('inf'), upper: float = float('inf')
+) -> float:
+    """Return a finite number within bounds."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidRequest(f'{name} must be a number')
+    if not (lower <= value <= upper and abs(value) < float('inf')):
+        raise InvalidRequest(f'{name} must be a number in [{lower:g}, {upper:g}]')
+    return float(value)
+
+
+def _choices() -> dict[str, dict[str, Any]]:
+    """Return what the page needs to know of the parameters that it sets."""
+    choices = {}
+    for node, names in SETTINGS.items():
+        choices[node] = {
+            name: {
+                'description': ROWS[node][name].description,
+                'allowed': ROWS[node][name].constraints,
+                'choices': list(ROWS[node][name].choices),
+                'kind': type(ROWS[node][name].default).__name__,
+            }
+            for name in names
+        }
+    return choices

@@ -1,0 +1,215 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Monitor node: what planned motions leave behind, from any source (docs/interfaces.md)."""
+
+from collections.abc import Sequence
+import sys
+from threading import Thread
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.core.monitor import (
+    load_libraries,
+    MonitorSettings,
+    PlannedMotion,
+    VibrationMonitor,
+    VibrationReport,
+)
+from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.nodes.stamp_clock import StampClock
+from flat_planner_ros.ros.parameters.declaration import (
+    InvalidParameter,
+    model_parameters,
+    NodeParameters,
+)
+from flat_planner_ros.ros.parameters.monitor import build, ROWS
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+TICK_PERIOD = 0.1
+"""Time between two looks for silence [s]."""
+
+LATE_TICK = 2.0 * TICK_PERIOD
+"""Time between two such looks beyond which the node has not been listening all the time [s]."""
+
+LOADING_DELAY = 0.1
+"""Time from the node's start after which it answers and may load libraries [s]."""
+
+DIAGNOSTICS_PERIOD = 1.0
+"""Time between two messages on `/diagnostics` [s]."""
+
+SAME_CLOCK = 3600.0
+"""Distance of a plan's start from the node's time below which both are of one clock [s]."""
+
+WARNING_PERIOD = 5.0
+"""Shortest time between two warnings about the same input [s]."""
+
+
+class MonitorNode(Node):
+    """Judges the oscillation after each motion of the latched plan."""
+
+    def __init__(self, **options: object) -> None:
+        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
+        super().__init__(interfaces.MONITOR, **options)
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
+        self._monitor = VibrationMonitor(self._configuration.settings)
+        self._forget()
+        publish = self.create_publisher
+        self._residual = publish(JointState, interfaces.RESIDUAL, interfaces.RELIABLE)
+        self._reports = publish(DiagnosticArray, interfaces.REPORT, interfaces.LATCHED)
+        self._health = publish(DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE)
+        plan = interfaces.of(interfaces.PLANNER, interfaces.PLAN)
+        listen = self.create_subscription
+        # As bytes: the points of a long plan would take a second to become Python objects.
+        listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED, raw=True)
+        listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        status = interfaces.of(interfaces.PLANNER, interfaces.STATUS)
+        listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
+        self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
+        self.create_service(Trigger, interfaces.RESET, self._on_reset)
+        # A simulated clock can stand still; noticing that must not depend on it.
+        self._steady = steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._ticked = steady.now().nanoseconds
+        self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
+        self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
+
+    def _on_loading(self) -> None:
+        """
+        Load what the first report needs, once, before there is anything to report.
+
+        Beside the executor: on a busy machine it takes longer than a whole motion, which would not
+        be seen.
+        """
+        self._loading.cancel()
+        Thread(target=load_libraries).start()
+
+    def _now(self) -> float:
+        """Return the node's time [s]."""
+        return conversions.seconds(self.get_clock().now().to_msg())
+
+    def _forget(self) -> None:
+        """Wait for a plan, as at the start."""
+        self._monitor.reset()
+        self._stamps = StampClock()
+        self._reader: conversions.JointStateReader | None = None
+        self._plan: PlannedMotion | None = None
+        self._report: VibrationReport | None = None
+
+    def _apply(self, settings: MonitorSettings) -> None:
+        """Judge with changed parameters from now on."""
+        self._monitor.settings = settings
+
+    def _on_plan(self, data: bytes) -> None:
+        """Take a plan, for whatever joints it names."""
+        try:
+            motion = conversions.planned_motion(conversions.points_of(data))
+        except FlatPlannerError as error:
+            self.get_logger().warning(f'plan ignored: {error}')
+            return
+        if self._plan is None or self._plan.joint_names != motion.joint_names:
+            self._forget()
+            self._reader = conversions.JointStateReader(motion.joint_names)
+        self._plan = motion
+        self._publish_report(self._monitor.plan(motion))
+
+    def _on_measured(self, msg: JointState) -> None:
+        """Take a sample and tell how far it is from the plan."""
+        if self._reader is None:
+            return
+        if not conversions.is_stamped(msg):
+            msg.header.stamp = self.get_clock().now().to_msg()
+        try:
+            sample = self._reader.read(msg)
+            report = self._monitor.add(sample)
+        except FlatPlannerError as error:
+            self._watch.heard_other_part()
+            self.get_logger().warning(
+                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
+            )
+            return
+        self._stamps.stamp = sample.time
+        if self._residual.get_subscription_count():
+            residual = self._monitor.residual(sample)
+            if residual is not None:
+                self._residual.publish(
+                    conversions.residual_msg(msg.header, self._reader.joints, residual)
+                )
+        self._publish_report(report)
+
+    def _on_status(self, msg: DiagnosticArray) -> None:
+        """Expect what the planner expects, once it has adopted other values than its file's."""
+        try:
+            values = diagnostics.adopted_values(msg)
+            if values:
+                result = self.set_parameters_atomically(model_parameters(**values))
+                if not result.successful:
+                    raise InvalidParameter(result.reason)
+        except FlatPlannerError as error:
+            self.get_logger().warning(f"the planner's model is not followed: {error}")
+
+    def _on_tick(self) -> None:
+        """Notice silence, unless the node itself has been busy: samples may be waiting then."""
+        steady = self._steady.now().nanoseconds
+        elapsed, self._ticked = (steady - self._ticked) / conversions.NANOSECONDS, steady
+        if elapsed > LATE_TICK:
+            return
+        now, plan = self._stamps.now(self._now()), self._plan
+        # The node's own time would end the watch of a plan that is of another clock.
+        is_known = self._stamps.stamp is not None
+        if plan is not None and (is_known or abs(now - plan.start) < SAME_CLOCK):
+            self._publish_report(self._monitor.tick(now))
+
+    def _on_diagnostics(self) -> None:
+        """Publish the present state, and say what was wrong since the last time."""
+        for trouble in self._monitor.take_troubles():
+            self.get_logger().warning(trouble)
+        phase, dropped = self._monitor.state.value, self._monitor.dropped
+        status = diagnostics.monitor_status(self._report, phase, dropped)
+        self._health.publish(diagnostics.array_of(status, self._now()))
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Forget plans, samples and the last report."""
+        self._forget()
+        response.success = True
+        response.message = 'waiting for the next plan'
+        return response
+
+    def _publish_report(self, report: VibrationReport | None) -> None:
+        """Publish and log a report, if there is one."""
+        if report is None:
+            return
+        self._report = report
+        status = diagnostics.report_status(report)
+        self._reports.publish(diagnostics.array_of(status, self._stamps.now(self._now())))
+        # One call for both would not do: a place in the code may log at one severity only.
+        if status.level == DiagnosticStatus.OK:
+            self.get_logger().info(status.message)
+        else:
+            self.get_logger().warning(status.message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the monitor node."""
+    return run([MonitorNode], args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

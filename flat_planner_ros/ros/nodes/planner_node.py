@@ -1,0 +1,246 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Planner node: goals in, certified flat motions and verdicts out (docs/interfaces.md)."""
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+import sys
+from time import perf_counter
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.core.planning import Reason, RequestRejected
+from flat_planner_ros.core.session import Goal, PlannerSession
+from flat_planner_ros.ros.nodes.effort_stream import EffortStream
+from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
+from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.parameters.declaration import NodeParameters
+from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+WARNING_PERIOD = 5.0
+"""Shortest time between two warnings about the same input [s]."""
+
+LIBRARIES = ('scipy.linalg.lapack', 'scipy.optimize')
+"""What planning through via points or in motion loads when it first needs it."""
+
+LOADING_DELAY = 0.001
+"""Time after which the libraries are loaded [s]; in the executor, when the node is ready."""
+
+
+class PlannerNode(Node):
+    """Answers goals with motions of one arm."""
+
+    def __init__(self, **options: object) -> None:
+        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
+        super().__init__(interfaces.PLANNER, **options)
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
+        self._session = PlannerSession(self._settings.session)
+        self._reader = conversions.JointStateReader(self._joints)
+        self._sent_start: float | None = None
+        publish = self.create_publisher
+        self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
+        self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
+        self._flat_plan = publish(JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED)
+        efforts = publish(Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE)
+        self._efforts = EffortStream(self, efforts, self._session)
+        self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
+        self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.VERDICTS)
+        listen = self.create_subscription
+        # As bytes: a message that is too long is refused before it takes seconds to be read.
+        for kind, topic, heard in (
+            (JointTrajectory, interfaces.GOAL, self._on_goal),
+            (JointState, interfaces.GOAL_STATE, self._on_goal_state),
+        ):
+            listen(kind, topic, heard, interfaces.BURST, raw=True)
+        listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        self._adoption = ModelAdoption(
+            self, lambda: self._settings, lambda: self._sent_start, self._publish_status
+        )
+        self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
+        self.create_service(Trigger, interfaces.STOP, self._on_stop)
+        self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
+        commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
+        self._watch = GraphWatch(self, commands, [interfaces.JOINT_STATES], is_listening=True)
+        self._apply(self._settings)
+        # Now, as nothing moves yet: in motion, half a second more would be too late for a start.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._loading = self.create_timer(LOADING_DELAY, self._load, clock=steady)
+
+    def destroy_node(self) -> None:
+        """End the stream of efforts with zeros, then the node."""
+        self._efforts.end()
+        super().destroy_node()
+
+    @property
+    def _settings(self) -> PlannerSettings:
+        """Return the settings in force."""
+        return self._configuration.settings
+
+    @property
+    def _joints(self) -> Sequence[str]:
+        """Return the arm's joints."""
+        return self._settings.session.joints
+
+    def _now(self) -> float:
+        """Return the present time [s]."""
+        return conversions.seconds(self.get_clock().now().to_msg())
+
+    def _apply(self, settings: PlannerSettings) -> None:
+        """Plan the next goals with changed parameters."""
+        self._session.settings = settings.session
+        self._efforts.configure(settings.stream_effort, settings.session.period)
+
+    def _load(self) -> None:
+        """Load, once, what planning can need."""
+        self._loading.cancel()
+        for library in LIBRARIES:
+            import_module(library)
+
+    def _on_goal(self, data: bytes) -> None:
+        """Answer a goal given as a trajectory."""
+        read = conversions.message_of
+        self._answer(lambda: conversions.goal_from_trajectory(read(data, JointTrajectory)))
+
+    def _on_goal_state(self, data: bytes) -> None:
+        """Answer a goal given as a pose."""
+        read = conversions.message_of
+        self._answer(lambda: conversions.goal_from_joint_state(read(data, JointState)))
+
+    def _on_measured(self, msg: JointState) -> None:
+        """Keep the measured state for the next start."""
+        try:
+            self._session.measure(self._reader.read(msg))
+        except FlatPlannerError as error:
+            self._watch.heard_other_part()
+            self.get_logger().warning(
+                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
+            )
+
+    def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Plan the last goal again."""
+        status = self._answer(lambda: self._session.last_goal)
+        response.success = status.level != DiagnosticStatus.ERROR
+        response.message = status.message
+        return response
+
+    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Bring the arm to rest early."""
+        try:
+            motion = self._session.stop(self._now(), self._now)
+        except FlatPlannerError as error:
+            response.success = False
+            response.message = f'not stopped: {error}'
+            return response
+        response.success = True
+        if motion is None:
+            response.message = 'nothing to stop: no motion is under way'
+            return response
+        self._publish_motion()
+        response.message = (
+            f'plan {motion.plan_id} comes to rest {motion.end - self._now():.3f} s from now'
+        )
+        self.get_logger().info(response.message)
+        self._report_ended()
+        return response
+
+    def _on_tick(self) -> None:
+        """Publish what is planned for now, and the end of a motion."""
+        self._report_ended()
+        now = self._now()
+        samples = self._session.reference(now)
+        if samples is not None:
+            self._reference.publish(conversions.reference_msg(samples, self._joints, now))
+
+    def _report_ended(self) -> None:
+        """Publish how motions have ended."""
+        for ended in self._session.ended(self._now()):
+            self._publish_status(diagnostics.ended_status(ended))
+
+    def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
+        """Give a goal exactly one verdict and, if it is accepted, carry it out."""
+        goal, started = None, perf_counter()
+        try:
+            goal = read()
+            motion = self._session.submit(goal, self._now(), self._now)
+        except RequestRejected as error:
+            status = diagnostics.rejected_status(error, goal)
+        except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
+            self.get_logger().error(f'internal error: {error!r}')
+            rejection = RequestRejected(Reason.INTERNAL, f'internal error: {error!r}')
+            status = diagnostics.rejected_status(rejection, goal)
+        else:
+            elapsed = perf_counter() - started
+            # The verdict's peaks take a while: the plant need not wait for them.
+            self._publish_motion()
+            status = diagnostics.accepted_status(
+                motion,
+                goal,
+                self._joints,
+                elapsed,
+                with_advice=self._settings.report_advice,
+                with_baselines=self._settings.report_baselines,
+            )
+        self._publish_status(status)
+        self._report_ended()
+        return status
+
+    def _publish_motion(self) -> None:
+        """Publish all that is still to be carried out, the command first: its start is near."""
+        settings = self._settings
+        track = self._session.track(self._now())
+        self._sent_start = track.start
+        plan = conversions.command_bytes(track, self._joints)
+        if settings.session.execute:
+            is_whole = settings.include_passive_joint and settings.include_effort
+            command = plan
+            if not (is_whole and settings.session.is_stamped):
+                command = conversions.command_bytes(
+                    track,
+                    self._joints,
+                    include_passive_joint=settings.include_passive_joint,
+                    include_effort=settings.include_effort,
+                    absolute_stamp=settings.session.is_stamped,
+                )
+            self._command.publish(command)
+        self._plan.publish(plan)
+        self._flat_plan.publish(conversions.flat_plan_bytes(track))
+
+    def _publish_status(self, status: DiagnosticStatus) -> None:
+        """Publish and log a verdict."""
+        self._status.publish(diagnostics.array_of(status, self._now()))
+        # A call for each: a logger refuses another severity from the same line.
+        if status.level == DiagnosticStatus.OK:
+            self.get_logger().info(status.message)
+        elif status.level == DiagnosticStatus.WARN:
+            self.get_logger().warning(status.message)
+        else:
+            self.get_logger().error(status.message)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the planner node."""
+    return run([PlannerNode], args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,165 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Plant node: a simulated arm that plays commands by time (docs/interfaces.md)."""
+
+from collections.abc import Sequence
+import sys
+
+from flat_planner_ros.core.arm import FlatPlannerError, InvalidCommand
+from flat_planner_ros.core.plant import ArmState, PacedArm
+from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.parameters.declaration import InvalidParameter, NodeParameters
+from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
+from flat_planner_ros.ros.wire import conversions, interfaces
+from rclpy.clock import Clock as RosClock
+from rclpy.clock import ClockType
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+CLOCK_START = 1.0
+"""Where /clock starts [s]; 0 would mean that there is no time yet."""
+
+WARNING_PERIOD = 1.0
+"""Time between two reports of what goes wrong again and again [s]."""
+
+
+class PlantNode(Node):
+    """Moves one simulated arm."""
+
+    def __init__(self, **options: object) -> None:
+        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
+        super().__init__(interfaces.PLANT, **options)
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
+        settings = self._settings
+        if settings.publish_clock and self.get_parameter('use_sim_time').value:
+            raise InvalidParameter(
+                'publish_clock and use_sim_time exclude each other: a plant that makes the time '
+                'cannot follow it, leave one of them out'
+            )
+        self._arm = PacedArm(settings.simulation, CLOCK_START if settings.publish_clock else None)
+        publish = self.create_publisher
+        self._joint_states = publish(JointState, interfaces.JOINT_STATES, interfaces.RELIABLE)
+        if settings.publish_clock:
+            self._graph_time = publish(Clock, interfaces.CLOCK, interfaces.RELIABLE)
+        self._listen()
+        self.create_service(Trigger, interfaces.RESET, self._on_reset)
+        # Steady: with use_sim_time, timers of the node's own clock wait for a /clock.
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        rate = self._arm.call_rate(settings.real_time_factor)
+        self.create_timer(1.0 / rate, self._on_tick, clock=self._steady)
+        self.create_timer(WARNING_PERIOD, self._on_watch, clock=self._steady)
+        self._on_tick()
+
+    @property
+    def _settings(self) -> PlantSettings:
+        """Return the settings in force."""
+        return self._configuration.settings
+
+    def _listen(self) -> None:
+        """Subscribe to what moves the arm."""
+        topic, kind, callback = {
+            CommandInput.TRAJECTORY: (interfaces.COMMAND, JointTrajectory, self._on_trajectory),
+            CommandInput.EFFORT: (interfaces.EFFORT_COMMANDS, Float64MultiArray, self._on_effort),
+        }[self._settings.command_input]
+        name = interfaces.of(interfaces.PLANNER, topic)
+        # As bytes: the points of a long command would take a second to become Python objects.
+        raw = callback == self._on_trajectory
+        self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)
+        clock = [interfaces.CLOCK] if self._settings.publish_clock else []
+        GraphWatch(self, [name, *clock], [interfaces.JOINT_STATES])
+
+    def _apply(self, settings: PlantSettings) -> None:
+        """Go on with another mismatch or other sensors."""
+        self._catch_up()
+        self._arm.settings = settings.simulation
+
+    def _on_trajectory(self, data: bytes) -> None:
+        """Play a command; one that cannot be played leaves the running one alone."""
+        self._catch_up()
+        try:
+            points = conversions.points_of(data)
+            if not len(points.times):
+                raise InvalidCommand(
+                    'it is empty; to end a motion call ~/reset, or ~/stop of the planner'
+                )
+            joints = self._settings.joints
+            profile = conversions.effort_profile(points, joints, self._arm.time)
+            remark = self._arm.command(profile)
+        except FlatPlannerError as error:
+            self.get_logger().warning(f'trajectory ignored: {error}')
+            return
+        if remark:
+            self.get_logger().warning(f'trajectory accepted, but {remark}')
+
+    def _on_effort(self, msg: Float64MultiArray) -> None:
+        """Apply efforts until the next ones."""
+        self._catch_up()
+        try:
+            self._arm.hold(msg.data)
+        except FlatPlannerError as error:
+            self.get_logger().warning(
+                f'effort ignored: {error}', throttle_duration_sec=WARNING_PERIOD
+            )
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Bring the arm back to rest where it started."""
+        self._catch_up()
+        self._arm.reset()
+        position = ', '.join(f'{angle:g}' for angle in self._settings.simulation.position)
+        response.success = True
+        response.message = f'at rest at [{position}] rad, no command'
+        return response
+
+    def _catch_up(self) -> None:
+        """Bring a plant that follows a clock to the present, where something is to change."""
+        if not self._settings.publish_clock:
+            self._on_tick()
+
+    def _on_tick(self) -> None:
+        """Go on to the present and publish what was passed."""
+        settings = self._settings
+        if settings.publish_clock:
+            wall = self._steady.now().nanoseconds / conversions.NANOSECONDS
+            samples = self._arm.lead(wall, settings.real_time_factor)
+        else:
+            samples = self._arm.follow(conversions.seconds(self.get_clock().now().to_msg()))
+        for sample in samples:
+            self._publish(sample)
+
+    def _publish(self, sample: ArmState) -> None:
+        """Publish a sample; its time first, so that nobody sees it before its time."""
+        msg = conversions.joint_state_msg(sample, self._settings.joints)
+        if self._settings.publish_clock:
+            self._graph_time.publish(Clock(clock=msg.header.stamp))
+        self._joint_states.publish(msg)
+
+    def _on_watch(self) -> None:
+        """Say what went wrong, with numbers, at most once per period."""
+        for trouble in self._arm.take_troubles():
+            self.get_logger().warning(trouble)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the plant node."""
+    return run([PlantNode], args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

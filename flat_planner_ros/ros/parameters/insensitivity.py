@@ -1,0 +1,110 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters of the strategy `insensitive` and of the predicted residual."""
+
+from flat_planner_ros.core.insensitive import (
+    Criterion,
+    DEFAULT_WEIGHT,
+    Insensitivity,
+    MAX_HALF_WIDTH,
+    MAX_INSENSITIVITY,
+    Nominal,
+    UncertaintyBox,
+)
+from flat_planner_ros.ros.parameters.declaration import Row, Values
+
+INSENSITIVITY_ROWS = [
+    Row(
+        name='insensitivity.stiffness',
+        default=0.1,
+        description='uncertainty of the stiffness, half-width as a share of the nominal value; '
+        'also of the predicted residual',
+        lower=0.0,
+        upper=MAX_HALF_WIDTH,
+    ),
+    Row(
+        name='insensitivity.damping',
+        default=0.1,
+        description='the same of the damping',
+        lower=0.0,
+        upper=MAX_HALF_WIDTH,
+    ),
+    Row(
+        name='insensitivity.nominal',
+        default=Nominal.EXACT.value,
+        description='what strategy insensitive may leave on the nominal arm: exact = nothing, '
+        'free = up to the worst residual, which takes less effort',
+        choices=tuple(nominal.value for nominal in Nominal),
+    ),
+    Row(
+        name='insensitivity.criterion',
+        default=Criterion.WORST.value,
+        description='which residual strategy insensitive weighs: worst or (root) mean (square)',
+        choices=tuple(criterion.value for criterion in Criterion),
+    ),
+    Row(
+        name='insensitivity.weight',
+        default=0.0,
+        description=f'a residual of distance / weight costs as much as the least effort; 0 = '
+        f'{DEFAULT_WEIGHT:g}, or what follows from the next two',
+        lower=0.0,
+        upper=MAX_INSENSITIVITY,
+    ),
+    Row(
+        name='insensitivity.max_effort_rms',
+        default=0.0,
+        description='RMS effort [N m] within which strategy insensitive leaves as little as it '
+        'can; 0 = not set',
+        lower=0.0,
+    ),
+    Row(
+        name='insensitivity.max_residual',
+        default=0.0,
+        description='worst residual [rad] that strategy insensitive keeps with as little effort '
+        'as it can; 0 = not set',
+        lower=0.0,
+    ),
+    Row(
+        name='insensitivity.modes',
+        default=16,
+        description='free coefficients of the law of strategy insensitive, 6 to 48: more take '
+        'less effort, steeper at the ends, and want a shorter sampling.period',
+    ),
+]
+"""Parameters of the planner node that concern its uncertainty."""
+
+
+def insensitivity_of(values: Values) -> Insensitivity:
+    """
+    Return what the parameters ask for.
+
+    Raises
+    ------
+    InvalidRequest
+        They contradict each other.
+
+    """
+    name = 'insensitivity'
+    return Insensitivity(
+        box=UncertaintyBox(
+            stiffness=values[f'{name}.stiffness'], damping=values[f'{name}.damping']
+        ),
+        nominal=Nominal(values[f'{name}.nominal']),
+        criterion=Criterion(values[f'{name}.criterion']),
+        weight=values[f'{name}.weight'],
+        max_effort_rms=values[f'{name}.max_effort_rms'],
+        max_residual=values[f'{name}.max_residual'],
+        modes=values[f'{name}.modes'],
+    )

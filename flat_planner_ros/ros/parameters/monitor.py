@@ -1,0 +1,109 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters of the monitor node."""
+
+from math import pi
+
+from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.monitor import ActuatedJoints, MonitorSettings
+from flat_planner_ros.ros.parameters.declaration import (
+    arm_of,
+    InvalidParameter,
+    model_rows,
+    Row,
+    Values,
+)
+
+ROWS = [
+    *model_rows(read_only=False),
+    Row(
+        name='window',
+        default=MonitorSettings.window,
+        description='time after a motion that is judged, several periods of the oscillation [s]',
+        lower=0.1,
+        upper=60.0,
+    ),
+    Row(
+        name='amplitude_ok',
+        default=MonitorSettings.amplitude_ok,
+        description='largest amplitude at the end of a motion that is OK, above 0 [rad]',
+        lower=0.0,
+    ),
+    Row(
+        name='amplitude_error',
+        default=MonitorSettings.amplitude_error,
+        description='largest amplitude that is no ERROR but a WARN [rad]',
+        lower=0.0,
+    ),
+    Row(
+        name='settling_band',
+        default=MonitorSettings.settling_band,
+        description='deviation of the passive joint that counts as settled, above 0 [rad]',
+        lower=0.0,
+    ),
+    Row(
+        name='timeout',
+        default=MonitorSettings.timeout,
+        description='silence after which joint states are stale [s]',
+        lower=0.01,
+        upper=60.0,
+    ),
+    Row(
+        name='actuated_joints',
+        default=MonitorSettings.actuated_joints.value,
+        description='what the actuated joints do after a motion; auto = seen from the samples',
+        choices=tuple(joints.value for joints in ActuatedJoints),
+    ),
+]
+"""All parameters of the monitor node."""
+
+
+def build(values: Values) -> MonitorSettings:
+    """
+    Return what the monitor looks at, tolerates and expects.
+
+    Raises
+    ------
+    FlatPlannerError
+        The values contradict each other, or the window cannot show the expected oscillation.
+
+    """
+    _, arm = arm_of(values)
+    frequency, damping_ratio = _expected(arm)
+    window = values['window']
+    if frequency is not None and window * frequency < 1.0:
+        raise InvalidParameter(
+            f'window {window:g} s is shorter than one period of the expected oscillation, '
+            f'{1.0 / frequency:.3g} s; give it several'
+        )
+    return MonitorSettings(
+        window=window,
+        amplitude_ok=values['amplitude_ok'],
+        amplitude_error=values['amplitude_error'],
+        settling_band=values['settling_band'],
+        timeout=values['timeout'],
+        expected_frequency=frequency,
+        expected_damping_ratio=damping_ratio,
+        arm=arm,
+        actuated_joints=ActuatedJoints(values['actuated_joints']),
+    )
+
+
+def _expected(arm: PlanarArm) -> tuple[float | None, float | None]:
+    """Return the damped frequency [Hz] and damping ratio [-], none if the arm does not swing."""
+    mode = arm.natural_mode()
+    if mode.damped_frequency == 0.0:
+        return None, None
+    return mode.damped_frequency / (2 * pi), mode.damping_ratio

@@ -1,0 +1,177 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Settings of a node from a parameter file, without a node.
+
+Tools that need what a node would know (an arm, options) read the file that the node is given by
+`--params-file` and follow the same rules: names and types, ranges, unknown names, both forms of
+the model, and the same sentence where something is wrong.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+import re
+from typing import Any
+
+from flat_planner_ros.ros.parameters.declaration import (
+    InvalidParameter,
+    model_defaults,
+    refuse_unknown,
+    Row,
+    Settings,
+    TYPE_HINTS,
+    Values,
+    wrong_type,
+)
+from rclpy.parameter import Parameter
+import yaml
+
+BLOCK = 'ros__parameters'
+"""Key under which a parameter file lists a node's values."""
+
+ASSIGNMENT = ':='
+"""Between name and value of an override, as ROS writes it."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads numbers as ROS does: 1e-4 is one, although YAML 1.1 asks for a decimal point."""
+
+
+_Loader.add_implicit_resolver(
+    'tag:yaml.org,2002:float', re.compile(r'^[-+]?\d+[eE][-+]?\d+$'), list('-+0123456789')
+)
+
+
+def read_settings(
+    path: Path | str | None,
+    rows: Sequence[Row],
+    build: Callable[[Values], Settings],
+    *,
+    node: str,
+    overrides: Sequence[str] = (),
+    warn: Callable[[str], object] = lambda text: None,
+) -> Settings:
+    """
+    Return the settings that a node would start with.
+
+    Parameters
+    ----------
+    path
+        Parameter file, as for `--params-file`; None for the defaults alone.
+    rows, build
+        Parameters and builder of the node, e.g. those of `planner_parameters`.
+    node
+        Name of the node with its namespace, e.g. ``flat_planner`` or ``/left/flat_planner``.
+    overrides
+        Texts ``name:=value``; they win over the file, as `-p node:name:=value` does. (ROS takes
+        `-p name:=value` for the block ``/**``, over which a node's own block wins.)
+    warn
+        Is told of names that mean nothing to the node.
+
+    Raises
+    ------
+    InvalidParameter
+        The file cannot be read, or the node would not start with it.
+    FlatPlannerError
+        The values are no valid settings.
+
+    """
+    given = {} if path is None else _from_file(Path(path), '/' + node.strip('/'))
+    for override in overrides:
+        name, separator, text = override.partition(ASSIGNMENT)
+        if not (separator and name and text):
+            raise InvalidParameter(f'an override is written name:=value, got {override!r}')
+        given[name] = _parsed(text, f'the value of {name}')
+    refuse_unknown(given, [row.name for row in rows], warn)
+    defaults = model_defaults(given)
+    values = {}
+    for row in rows:
+        value = given.get(row.name, defaults.get(row.name, row.default))
+        if isinstance(value, Parameter.Type):
+            continue
+        _check_type(row, value)
+        row.check(value)
+        values[row.name] = value
+    return build(values)
+
+
+def _from_file(path: Path, node: str) -> dict[str, Any]:
+    """Return all values in a file that are meant for a node, later blocks winning."""
+    try:
+        text = path.read_text('utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, 'strerror', None) or 'not a text file'
+        raise InvalidParameter(f'cannot read {path}: {reason}') from error
+    content = _parsed(text, str(path))
+    if not isinstance(content, Mapping):
+        raise InvalidParameter(f'{path} is no parameter file: it has no block for any node')
+    values: dict[str, Any] = {}
+    for pattern, block in _blocks(content, path):
+        if re.fullmatch(_expression(pattern), node):
+            values.update(_flat(block))
+    return values
+
+
+def _parsed(text: str, source: str) -> Any:
+    """Return YAML as Python values."""
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        reason = ' '.join(str(error).split())
+        raise InvalidParameter(f'{source} is not valid YAML: {reason}') from error
+
+
+def _blocks(
+    tree: Mapping[str, Any], path: Path, prefix: str = ''
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Return the name pattern and the values of every node's block, namespaces unfolded."""
+    for key, value in tree.items():
+        name = f'{prefix}/{str(key).strip("/")}'
+        if not isinstance(value, Mapping):
+            raise InvalidParameter(
+                f'{path} is no parameter file: every block needs {BLOCK}:, but {name.strip("/")} '
+                f'is {value!r}'
+            )
+        if BLOCK in value:
+            yield name, value[BLOCK] or {}
+        else:
+            yield from _blocks(value, path, name)
+
+
+def _expression(pattern: str) -> str:
+    """Return the regular expression of a node name in which * stands for one part, ** for any."""
+    parts = {'*': r'(/\w+)', '**': r'(/\w+)*'}
+    return ''.join(parts.get(part, '/' + re.escape(part)) for part in pattern.split('/')[1:])
+
+
+def _flat(block: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Return names with dots and their values."""
+    for key, value in block.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}', value
+
+
+def _check_type(row: Row, value: Any) -> None:
+    """Refuse a value of another type than the parameter's, as the middleware does."""
+    try:
+        given = Parameter.Type.from_parameter_value(value)
+    except TypeError as error:
+        hint = TYPE_HINTS.get(row.type, '')
+        raise InvalidParameter(f'{row.name} has values of several types{hint}') from error
+    is_empty_list = isinstance(value, list) and not value
+    if given is not row.type and not (is_empty_list and row.type.name.endswith('_ARRAY')):
+        raise wrong_type(row, value)

@@ -1,0 +1,267 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Plan a motion on the command line, without a ROS graph."""
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Mapping, Sequence
+import csv
+from dataclasses import replace
+from itertools import chain
+import json
+from pathlib import Path
+import sys
+from time import perf_counter
+
+from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.core.planning import RequestRejected
+from flat_planner_ros.core.session import (
+    Goal,
+    GoalPoint,
+    Motion,
+    PlannerSession,
+    SessionSettings,
+    StartSource,
+    Track,
+)
+from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.parameters.planner import build, ROWS
+from flat_planner_ros.ros.programs.extras import explain_missing
+from flat_planner_ros.ros.wire import diagnostics, interfaces
+
+EXAMPLES = """
+examples:
+  flat_plan joint1=3.14159 --duration 1
+      the paper's arm, least effort
+  flat_plan joint1=1.5 --duration 0.8 --params-file my_arm.yaml --png plan.png
+      your own arm, with a figure
+  flat_plan joint1=3.14159 --duration 1 -p strategy:=mixed -p weights.p:=20.0 --csv plan.csv
+      another strategy, as points every sampling.period
+  flat_plan joint1=1 joint2=0.5 --start joint1=-1 --params-file arm_3dof.yaml --duration 2
+      from another start; joints that are not named stay where they are
+  flat_plan joint1=2 --duration 2 --via 'joint1=1.5@0.8' --json -
+      through a via point at 0.8 s; the numbers as JSON
+"""
+
+NOW = 1.0
+"""Any time will do for a plan that nobody carries out [s]."""
+
+QUANTITIES = {
+    'positions': 'position {} [rad]',
+    'velocities': 'velocity {} [rad/s]',
+    'accelerations': 'acceleration {} [rad/s^2]',
+    'efforts': 'effort {} [N m]',
+}
+"""Tables of a plan, in the order of a trajectory message, with the titles of their columns."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Plan and print.
+
+    Returns
+    -------
+    int
+        0 if there is a plan, 1 if the goal or the parameters are refused, 2 for a wrong call.
+
+    """
+    options = _parser().parse_args(args)
+    try:
+        settings = read_settings(
+            options.params_file,
+            ROWS,
+            build,
+            node=f'{options.namespace}/{interfaces.PLANNER}',
+            overrides=options.parameter,
+            warn=lambda text: print(f'flat_plan: {text}', file=sys.stderr),
+        )
+        session, goal = _task(settings.session, options)
+        started = perf_counter()
+        motion = session.submit(goal, NOW)
+        elapsed = perf_counter() - started
+        track = session.track(NOW)
+        joints = settings.session.joints
+        status = diagnostics.accepted_status(motion, goal, joints, elapsed)
+        values = {pair.key: pair.value for pair in status.values}
+        if options.json != '-':
+            _print_summary(motion, values)
+        _write(options, joints, track, values)
+    except RequestRejected as error:
+        code = interfaces.ERROR_CODES[error.reason]
+        print(f'flat_plan: {error.reason.value} ({code}): {error}', file=sys.stderr)
+        return 1
+    except (FlatPlannerError, OSError) as error:
+        print(f'flat_plan: {error}', file=sys.stderr)
+        return 1
+    except ImportError as error:
+        return explain_missing(error, 'plot')
+    return 0
+
+
+def _parser() -> ArgumentParser:
+    """Return the command line."""
+    parser = ArgumentParser(
+        prog='flat_plan',
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        'goal', nargs='+', type=_angle, metavar='JOINT=RAD', help='final angle of a joint [rad]'
+    )
+    parser.add_argument(
+        '--duration',
+        type=float,
+        default=0.0,
+        metavar='S',
+        help='of the motion [s]; without it, as the parameters say (duration.default, limits)',
+    )
+    parser.add_argument(
+        '--start',
+        nargs='+',
+        action='extend',
+        default=[],
+        type=_angle,
+        metavar='JOINT=RAD',
+        help='where joints start, at rest (default: 0)',
+    )
+    parser.add_argument(
+        '--via',
+        action='append',
+        default=[],
+        type=_via,
+        metavar='JOINT=RAD[,JOINT=RAD…][@S]',
+        help='point to pass, at a time unless the planner is to choose; may be repeated',
+    )
+    parser.add_argument('--params-file', metavar='FILE', help="default: the paper's arm")
+    parser.add_argument(
+        '-p',
+        '--parameter',
+        action='append',
+        default=[],
+        metavar='NAME:=VALUE',
+        help='parameter of the planner, before the file; may be repeated',
+    )
+    parser.add_argument(
+        '--namespace', default='', help="of the planner, for files with a namespace's blocks"
+    )
+    output = parser.add_argument_group('output, besides the summary')
+    output.add_argument('--csv', metavar='FILE', help='points every sampling.period')
+    output.add_argument('--json', metavar='FILE', help='summary and points; - prints them instead')
+    output.add_argument('--png', metavar='FILE', help='figure of the motion (needs matplotlib)')
+    return parser
+
+
+def _angle(text: str) -> tuple[str, float]:
+    """Return a joint and its angle [rad]."""
+    name, separator, value = text.partition('=')
+    try:
+        if name and separator:
+            return name, float(value)
+    except ValueError:
+        pass
+    raise ArgumentTypeError(f'{text!r} is not JOINT=RAD, e.g. joint1=1.57')
+
+
+def _via(text: str) -> tuple[dict[str, float], float]:
+    """Return a pose and its time, 0 where it is left open [s]."""
+    pose, separator, time = text.partition('@')
+    try:
+        return dict(map(_angle, pose.split(','))), float(time) if separator else 0.0
+    except ValueError:
+        raise ArgumentTypeError(f'{time!r} in {text!r} is no time in seconds') from None
+
+
+def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession, Goal]:
+    """Return a planner at rest at the start, and the goal."""
+    start = {**dict.fromkeys(settings.joints, 0.0), **dict(options.start)}
+    for name in start:
+        if name not in settings.joints:
+            raise FlatPlannerError(
+                f'--start: unknown joint {name!r}; the arm has {", ".join(settings.joints)}'
+            )
+    session = PlannerSession(
+        replace(
+            settings,
+            start_source=StartSource.PARAMETER,
+            start_position=tuple(start.values()),
+            execute=False,
+        )
+    )
+    poses = [start]
+    for changes in [*(pose for pose, _ in options.via), options.goal]:
+        poses.append({**poses[-1], **dict(changes)})
+    names = tuple(poses[-1])
+    times = [*(time for _, time in options.via), options.duration]
+    points = [
+        GoalPoint(time=time, positions=tuple(pose.get(name, 0.0) for name in names))
+        for pose, time in zip(poses[1:], times, strict=True)
+    ]
+    return session, Goal(joint_names=names, points=tuple(points))
+
+
+def _print_summary(motion: Motion, values: Mapping[str, str]) -> None:
+    """Print what the verdict on a goal says, less what only matters in motion."""
+    left_out = {'plan_id', 'state', 'error_code', 'error_name', 'start_time'}
+    plan = motion.plan
+    print(f'{plan.options.strategy.value}, {plan.duration:g} s')
+    shown = {
+        key: value
+        for key, value in values.items()
+        if key not in left_out and not key.startswith('goal.')
+    }
+    width = max(map(len, shown))
+    for key, value in shown.items():
+        print(f'  {key:{width}}  {value}')
+
+
+def _write(
+    options: Namespace, joints: Sequence[str], track: Track, values: Mapping[str, str]
+) -> None:
+    """Write the files that are asked for."""
+    if options.csv:
+        with open(options.csv, 'w', newline='', encoding='utf-8') as file:
+            writer = csv.writer(file)
+            titles = [title.format(name) for title in QUANTITIES.values() for name in joints]
+            writer.writerow(['time [s]', *titles])
+            tables = [getattr(track, quantity) for quantity in QUANTITIES]
+            for index, time in enumerate(track.times.tolist()):
+                writer.writerow([time, *chain(*(table[index].tolist() for table in tables))])
+    if options.json:
+        content = {
+            'summary': {key: _number(value) for key, value in values.items()},
+            'joints': list(joints),
+            'times': track.times.tolist(),
+            **{quantity: getattr(track, quantity).tolist() for quantity in QUANTITIES},
+        }
+        if options.json == '-':
+            print(json.dumps(content))
+        else:
+            Path(options.json).write_text(json.dumps(content), encoding='utf-8')
+    if options.png:
+        from flat_planner_ros.figures.plan_figure import draw_plan
+
+        draw_plan(track, joints, Path(options.png))
+
+
+def _number(text: str) -> float | str:
+    """Return a value as a number where it is one."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,116 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Print the URDF of the arm in a parameter file."""
+
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+
+from flat_planner_ros.core.arm import ControlBlock, FlatPlannerError, PLUGINS
+from flat_planner_ros.ros.programs.robot_description import read_urdf
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Write the URDF; 0 if it could be made, 1 if the parameters are no arm."""
+    options = _parser().parse_args(args)
+    try:
+        urdf = read_urdf(
+            options.params_file,
+            namespace=options.namespace,
+            drawn_length=options.drawn_length,
+            control=_control(options),
+        )
+        if options.output:
+            Path(options.output).write_text(urdf, 'utf-8')
+        else:
+            sys.stdout.write(urdf)
+    except (FlatPlannerError, OSError) as error:
+        print(f'make_urdf: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> ArgumentParser:
+    """Return the command line."""
+    parser = ArgumentParser(
+        prog='make_urdf',
+        description='Print the URDF of the arm in a parameter file: its links with their '
+        'inertias, and on demand its ros2_control block.',
+        epilog='example: make_urdf arm.yaml --ros2-control mock --output arm.urdf',
+    )
+    parser.add_argument(
+        'params_file',
+        nargs='?',
+        help="ROS parameter file with the arm's model; without it, the paper's arm",
+    )
+    parser.add_argument('-o', '--output', metavar='FILE', help='write to a file instead')
+    parser.add_argument(
+        '--namespace', default='', help="of the planner, for files with a namespace's blocks"
+    )
+    parser.add_argument(
+        '--drawn-length',
+        type=float,
+        metavar='METRES',
+        help='length of link n-1 of an arm in reduced form, which leaves it open',
+    )
+    control = parser.add_argument_group('ros2_control')
+    control.add_argument(
+        '--ros2-control',
+        metavar='PLUGIN',
+        help=f'add a block for a hardware plugin: {", ".join(PLUGINS)} or its full name',
+    )
+    control.add_argument(
+        '--command-interface',
+        choices=('effort', 'position'),
+        default='effort',
+        help='of the actuated joints (default: effort)',
+    )
+    control.add_argument(
+        '--hardware-param',
+        action='append',
+        default=[],
+        type=_assignment,
+        metavar='NAME=VALUE',
+        help='parameter of the hardware plugin; may be repeated',
+    )
+    control.add_argument(
+        '--controllers', default='', metavar='FILE', help="controllers' parameter file, for gz"
+    )
+    return parser
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    """Return name and value."""
+    name, separator, value = text.partition('=')
+    if not (name and separator):
+        raise ArgumentTypeError(f'{text!r} is not NAME=VALUE')
+    return name, value
+
+
+def _control(options: Namespace) -> ControlBlock | None:
+    """Return what is asked for ros2_control."""
+    if options.ros2_control is None:
+        return None
+    return ControlBlock(
+        plugin=options.ros2_control,
+        command_interface=options.command_interface,
+        hardware_parameters=dict(options.hardware_param),
+        controllers=options.controllers,
+    )
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,359 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The paper's experiment, carried out on the three nodes by topics, services and parameters."""
+
+from collections.abc import Callable, Sequence
+from subprocess import Popen
+from threading import Event
+from time import monotonic
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.figures.paper_example import (
+    DURATION,
+    GOAL_ANGLE,
+    Method,
+    Recording,
+    Result,
+    Scenario,
+)
+from flat_planner_ros.ros.parameters.declaration import EXAMPLE_ARM
+from flat_planner_ros.ros.wire import conversions, interfaces
+import numpy as np
+from numpy.typing import NDArray
+from rcl_interfaces.srv import SetParametersAtomically
+import rclpy
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from scipy.integrate import trapezoid
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+LEAD = 0.3
+"""From sending a goal to the start of its motion, in real time [s]."""
+
+DISCOVERY = 3.0
+"""Time given to nodes that already run to be discovered [s]."""
+
+PATIENCE = 60.0
+"""Real time that a step of the experiment may take [s]."""
+
+REPORT_PATIENCE = 20.0
+"""Real time that a motion and its report may take [s]."""
+
+ATTEMPTS = 4
+"""Runs of one case until the plant played the command from its first point on."""
+
+PLAYED_TOLERANCE = 1e-3
+"""Largest difference of applied and planned effort in a valid run, relative to the peak [-]."""
+
+PASSING = (
+    'BUSY',
+    'NOT_AT_REST',
+    'OLD_HEADER_TIMESTAMP',
+    'START_STATE_MISMATCH',
+    'START_STATE_UNKNOWN',
+    'START_STATE_STALE',
+)
+"""Rejections that a later try overcomes: the planner has not seen the reset, or was late."""
+
+PAUSE = 0.1
+"""Real time between two tries of a goal [s]."""
+
+RECORDING = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
+"""For the joint states of one run: none is lost while this process is busy."""
+
+OURS = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
+"""The nodes that take part."""
+
+
+class ExperimentFailed(Exception):
+    """The experiment cannot go on; the message says why."""
+
+
+class Interrupted(Exception):
+    """SIGINT or SIGTERM has come."""
+
+
+class NotPlayed(Exception):
+    """A run that a busy machine has spoilt."""
+
+
+class Experimenter(Node):
+    """
+    Talks to the three nodes as any user does.
+
+    Parameters
+    ----------
+    speed
+        Simulated seconds per second.
+    processes
+        Those of the nodes; the experiment ends when one of them does.
+    interrupted
+        Ends it, too.
+
+    """
+
+    def __init__(self, speed: float, processes: Sequence[Popen], interrupted: Event) -> None:
+        """Open the topics and services of the three nodes."""
+        super().__init__('paper_table')
+        self._lead = LEAD * max(speed, 1.0)
+        self._processes = processes
+        self._interrupted = interrupted
+        self._states: list[JointState] = []
+        self._plans: list[JointTrajectory] = []
+        self._verdicts: list[DiagnosticArray] = []
+        self._reports: list[DiagnosticArray] = []
+        planner, plant, monitor = OURS
+        goal, plan = (interfaces.of(planner, t) for t in (interfaces.GOAL, interfaces.PLAN))
+        status = interfaces.of(planner, interfaces.STATUS)
+        report = interfaces.of(monitor, interfaces.REPORT)
+        self._goals = self.create_publisher(JointTrajectory, goal, interfaces.RELIABLE)
+        for kind, name, heard, quality in (
+            (JointState, interfaces.JOINT_STATES, self._states, RECORDING),
+            (JointTrajectory, plan, self._plans, interfaces.LATCHED),
+            (DiagnosticArray, status, self._verdicts, interfaces.LATCHED_HISTORY),
+            (DiagnosticArray, report, self._reports, interfaces.LATCHED),
+        ):
+            self.create_subscription(kind, name, heard.append, quality)
+        self._setters = {
+            name: self.create_client(SetParametersAtomically, f'{name}/set_parameters_atomically')
+            for name in OURS
+        }
+        self._reset = self.create_client(Trigger, interfaces.of(plant, interfaces.RESET))
+        self._adopt = self.create_client(Trigger, interfaces.of(planner, interfaces.ADOPT))
+
+    def wait_for_nodes(self) -> None:
+        """Wait until all three nodes answer and hear each other."""
+        planner, plant, monitor = OURS
+        command = interfaces.of(planner, interfaces.COMMAND)
+        plan = interfaces.of(planner, interfaces.PLAN)
+
+        def are_listening() -> bool:
+            listeners = [
+                *self.get_subscriptions_info_by_topic(self.resolve_topic_name(command)),
+                *self.get_subscriptions_info_by_topic(self.resolve_topic_name(plan)),
+                *self.get_subscriptions_info_by_topic(
+                    self.resolve_topic_name(interfaces.JOINT_STATES)
+                ),
+            ]
+            names = [info.node_name for info in listeners]
+            return {plant, monitor, planner} <= set(names) and names.count(monitor) > 1
+
+        self._await(
+            lambda: (
+                all(client.service_is_ready() for client in self._setters.values())
+                and self._reset.service_is_ready()
+                and self._adopt.service_is_ready()
+                and self._goals.get_subscription_count() > 0
+                and bool(self._states)
+                and are_listening()
+            ),
+            'the three nodes do not find each other',
+        )
+
+    def run(self, scenario: Scenario, method: Method) -> Result:
+        """
+        Carry out one motion, or the second of two by a method that learns.
+
+        A motion that the machine was too busy to play from the start is carried out again.
+
+        Raises
+        ------
+        ExperimentFailed
+            A node died, refused something or did not answer.
+
+        """
+        self._configure(scenario, method)
+        if company := [name for name in OURS if self.get_node_names().count(name) > 1]:
+            raise ExperimentFailed(_complaint(company))
+        if method.learns:
+            self._played(scenario, method)
+            self._learn()
+        return self._played(scenario, method)
+
+    def _played(self, scenario: Scenario, method: Method) -> Result:
+        """Return a motion that was played as planned."""
+        for _ in range(ATTEMPTS):
+            try:
+                return self._attempt(scenario, method)
+            except NotPlayed as reason:
+                self.get_logger().warning(f'{reason}; once more')
+                self._lead *= 2.0
+        raise ExperimentFailed(f'not played as planned {ATTEMPTS} times: the machine is too busy')
+
+    def _learn(self) -> None:
+        """Have the planner adopt the monitor's estimate as soon as it has heard of it."""
+        deadline = monotonic() + REPORT_PATIENCE
+        while not (answer := self._call(self._adopt, Trigger.Request())).success:
+            if monotonic() > deadline:
+                raise ExperimentFailed(f'no estimate was adopted: {answer.message}')
+            self._spin_until(lambda: False, PAUSE)
+
+    def _configure(self, scenario: Scenario, method: Method) -> None:
+        """Set the planner, what it knows of the arm, and the plant's mismatch."""
+        planner, plant, monitor = OURS
+        damping = scenario.damping_factor * EXAMPLE_ARM['model.damping']
+        self._set(
+            planner,
+            {
+                **method.parameters,
+                'model.stiffness': EXAMPLE_ARM['model.stiffness'],
+                'model.damping': damping,
+            },
+        )
+        self._set(monitor, {'model.damping': damping})
+        mismatch = {
+            'mismatch.stiffness_scale': scenario.stiffness_scale,
+            'mismatch.damping_scale': scenario.damping_scale,
+        }
+        self._set(plant, mismatch)
+
+    def _set(self, node: str, values: dict[str, Any]) -> None:
+        """Set parameters of a node, all or none."""
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        request = SetParametersAtomically.Request(
+            parameters=[parameter.to_parameter_msg() for parameter in parameters]
+        )
+        answer = self._call(self._setters[node], request).result
+        if not answer.successful:
+            raise ExperimentFailed(f'{node} refused its parameters: {answer.reason}')
+
+    def _attempt(self, scenario: Scenario, method: Method) -> Result:
+        """Carry out one motion from rest."""
+        self._call(self._reset, Trigger.Request())
+        for heard in (self._states, self._verdicts, self._plans, self._reports):
+            heard.clear()
+        self._await(lambda: bool(self._states), 'no joint states')
+        start = self._accepted_start()
+        if not self._spin_until(lambda: bool(self._plans and self._reports), REPORT_PATIENCE):
+            raise NotPlayed(f'no report of the motion at {start:.3f} s')
+        values = {pair.key: pair.value for pair in self._reports[0].status[0].values}
+        if 'amplitude' not in values:
+            raise NotPlayed(f'no amplitude: {self._reports[0].status[0].message}')
+        recording = _recording(self._states, start)
+        times, planned = _planned_efforts(self._plans[0])
+        # Compared where there are joint states: a busy machine loses some of them.
+        moving = (recording.times >= 0.0) & (recording.times <= DURATION)
+        expected = np.interp(recording.times[moving], times, planned)
+        error = np.abs(recording.efforts[moving] - expected)
+        if not moving.any() or error.max() > PLAYED_TOLERANCE * np.abs(planned).max():
+            raise NotPlayed('the command reached the plant after its start')
+        rms = float(np.sqrt(trapezoid(planned**2, times) / DURATION))
+        return Result(scenario, method.name, rms, float(values['amplitude']), recording)
+
+    def _accepted_start(self) -> float:
+        """Send the goal until the planner has seen the reset; return the motion's start [s]."""
+        deadline = monotonic() + PATIENCE
+        while True:
+            start = conversions.seconds(self._states[-1].header.stamp) + self._lead
+            self._verdicts.clear()
+            self._goals.publish(_goal(start))
+            self._await(lambda: bool(self._verdicts), 'no verdict on the goal')
+            verdict = self._verdicts[0].status[0]
+            values = {pair.key: pair.value for pair in verdict.values}
+            if values['state'] == 'ACCEPTED':
+                return start
+            if values['error_name'] not in PASSING or monotonic() > deadline:
+                raise ExperimentFailed(f'the goal was rejected: {verdict.message}')
+            self._spin_until(lambda: False, PAUSE)
+
+    def _call(self, client: Client, request: Any) -> Any:
+        """Return the answer of a service."""
+        future = client.call_async(request)
+        self._await(future.done, f'{client.srv_name} does not answer')
+        return future.result()
+
+    def _await(self, condition: Callable[[], bool], complaint: str) -> None:
+        """Spin until a condition holds."""
+        if not self._spin_until(condition, PATIENCE):
+            raise ExperimentFailed(f'{complaint} within {PATIENCE:g} s')
+
+    def _spin_until(self, condition: Callable[[], bool], patience: float) -> bool:
+        """Spin until a condition holds; return whether it did before patience [s] ended."""
+        deadline = monotonic() + patience
+        while not condition():
+            if self._interrupted.is_set():
+                raise Interrupted
+            if any(process.poll() is not None for process in self._processes):
+                raise ExperimentFailed('one of the three nodes has ended')
+            if monotonic() > deadline:
+                return False
+            rclpy.spin_once(self, timeout_sec=0.1)
+        return True
+
+
+def refuse_company(interrupted: Event) -> None:
+    """
+    Make sure that none of our nodes is running: a goal would reach both.
+
+    Raises
+    ------
+    ExperimentFailed
+        One is.
+    Interrupted
+        If the event is set meanwhile.
+
+    """
+    node = Node('paper_table_probe')
+    deadline = monotonic() + DISCOVERY
+    try:
+        while monotonic() < deadline:
+            if interrupted.is_set():
+                raise Interrupted
+            rclpy.spin_once(node, timeout_sec=0.1)
+            present = sorted(set(OURS) & set(node.get_node_names()))
+            if present:
+                raise ExperimentFailed(_complaint(present))
+    finally:
+        node.destroy_node()
+
+
+def _complaint(names: Sequence[str]) -> str:
+    """Return what to do about nodes that were there before."""
+    return (
+        f'{", ".join(names)} already runs here: stop it, or choose another ROS_DOMAIN_ID for the '
+        f'experiment'
+    )
+
+
+def _goal(start: float) -> JointTrajectory:
+    """Return the goal of the example with its absolute start [s]."""
+    point = JointTrajectoryPoint(
+        positions=[float(GOAL_ANGLE)], time_from_start=conversions.duration_msg(DURATION)
+    )
+    goal = JointTrajectory(joint_names=[EXAMPLE_ARM['joints'][0]], points=[point])
+    goal.header.stamp = conversions.time_msg(start)
+    return goal
+
+
+def _recording(states: Sequence[JointState], start: float) -> Recording:
+    """Return the joint states of one run on the time axis of its motion."""
+    reader = conversions.JointStateReader(EXAMPLE_ARM['joints'])
+    samples = [reader.read(state) for state in states]
+    return Recording(
+        times=np.array([sample.time for sample in samples]) - start,
+        positions=np.array([sample.positions for sample in samples]),
+        efforts=np.array([sample.efforts[0] for sample in samples]),
+    )
+
+
+def _planned_efforts(plan: JointTrajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return times [s] and efforts of joint 1 [N m]."""
+    motion = conversions.planned_motion_from_trajectory(plan)
+    return motion.times, motion.efforts[:, 0]

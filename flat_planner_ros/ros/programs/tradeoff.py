@@ -1,0 +1,203 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Effort against residual oscillation of the arm in a parameter file, as a picture and as numbers.
+
+Draws what the strategies, input shaping and the sweep of `insensitive` need and leave behind, for
+one motion and for longer ones. No node has to run.
+"""
+
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+import csv
+from dataclasses import astuple, fields
+from importlib.util import find_spec
+from pathlib import Path
+import sys
+
+from flat_planner_ros.core.arm import FlatModel, FlatPlannerError
+from flat_planner_ros.core.planning import (
+    MotionRequest,
+    PlanningOptions,
+    tradeoff_points,
+    TradeoffPoint,
+)
+from flat_planner_ros.ros.parameters import planner as planner_parameters
+from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.wire import interfaces
+import numpy as np
+
+STRETCHES = (1.0, 1.1, 1.25, 1.5)
+"""Durations of the sweeps unless others are asked for, over that of the motion [-]."""
+
+EXAMPLES = """\
+examples:
+  tradeoff --final 3.14 0 --duration 1 --plot tradeoff.png
+  tradeoff --params-file arm.yaml --final 1.5 0 --duration 0.8 --csv tradeoff.csv
+  tradeoff --final 3.14 0 --duration 1 --stretch 1 1.05 -p insensitivity.stiffness:=0.2
+"""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """
+    Compute, print and draw.
+
+    Returns
+    -------
+    int
+        0 when all is written, 1 when something is wrong with the input, 2 for a wrong option.
+
+    """
+    options = _options(args)
+    try:
+        points, box = _points(options)
+        _print(points, box)
+        if options.csv is not None:
+            _write_csv(points, options.csv)
+        if options.plot is not None:
+            # Imported here: matplotlib is an extra.
+            from flat_planner_ros.figures.tradeoff_figure import draw
+
+            draw(points, box, options.plot)
+            print(f'figure: {options.plot}')
+    except (FlatPlannerError, OSError) as error:
+        print(f'tradeoff: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+def _options(args: Sequence[str] | None) -> Namespace:
+    """Return the command line's options."""
+    parser = ArgumentParser(
+        prog='tradeoff',
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add('--params-file', metavar='FILE', type=Path, help='of the planner node; else its defaults')
+    add(
+        '-p',
+        '--parameter',
+        metavar='NAME:=VALUE',
+        action='append',
+        default=[],
+        help='another value of a parameter of the planner node; may be repeated',
+    )
+    add(
+        '--final',
+        metavar='ANGLE',
+        type=float,
+        nargs='+',
+        required=True,
+        help='final angle of every joint [rad], the passive one 0; may be left out at the end',
+    )
+    add(
+        '--start', metavar='ANGLE', type=float, nargs='+', help='the same of the start; else zeros'
+    )
+    add('--duration', metavar='SECONDS', type=float, required=True, help='of the motion')
+    add(
+        '--stretch',
+        metavar='RATIO',
+        type=float,
+        nargs='+',
+        default=STRETCHES,
+        help='durations of the sweeps over that of the motion (default: 1 1.1 1.25 1.5)',
+    )
+    add('--plot', metavar='FILE.png', type=Path, help='draw the picture')
+    add('--csv', metavar='FILE', type=Path, help='write the numbers')
+    options = parser.parse_args(args)
+    if options.plot is not None and find_spec('matplotlib') is None:
+        parser.error('--plot needs matplotlib: pip install "flat_planner_ros[plot]"')
+    return options
+
+
+def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
+    """Return all points, and the uncertainty in words."""
+    settings = read_settings(
+        options.params_file,
+        planner_parameters.ROWS,
+        planner_parameters.build,
+        node=interfaces.PLANNER,
+        overrides=options.parameter,
+        warn=lambda text: print(f'tradeoff: {text}', file=sys.stderr),
+    ).session
+    arm, planning = settings.arm, settings.options
+    request = MotionRequest(
+        start=_pose(options.start or [], arm.n),
+        final=_pose(options.final, arm.n),
+        duration=options.duration,
+    )
+    wanted = PlanningOptions(
+        r=planning.r,
+        p=planning.p,
+        flat_model=FlatModel.EXACT,
+        insensitivity=planning.insensitivity,
+    )
+    box = planning.insensitivity.box
+    text = f'stiffness ±{100.0 * box.stiffness:g} %, damping ±{100.0 * box.damping:g} %'
+    return tradeoff_points(request, arm, wanted, stretches=options.stretch), text
+
+
+def _pose(angles: Sequence[float], joints: int) -> np.ndarray:
+    """Return an angle for every joint."""
+    if len(angles) > joints:
+        raise FlatPlannerError(f'{len(angles)} angles for an arm of {joints} joints')
+    return np.array([*angles, *[0.0] * (joints - len(angles))])
+
+
+def _print(points: Sequence[TradeoffPoint], box: str) -> None:
+    """Print what is no sweep, and the nearest of each sweep to it."""
+    print(f'worst residual over {box}')
+    print(' method                | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]')
+    print('-----------------------+--------------+------------------+---------------+------------')
+    for point in points:
+        if point.weight == 0.0:
+            print(_line(point))
+    reference = next(point for point in points if point.weight == 0.0)
+    print(
+        f'insensitive, with at most the effort of {reference.series} ({reference.rms_effort:.4g}):'
+    )
+    for name, duration in dict.fromkeys((p.series, p.duration) for p in points if p.weight > 0.0):
+        within = [
+            p
+            for p in points
+            if (p.series, p.duration) == (name, duration)
+            and p.weight > 0.0
+            and p.rms_effort <= reference.rms_effort
+        ]
+        if within:
+            print(_line(min(within, key=lambda p: p.worst)))
+
+
+def _line(point: TradeoffPoint) -> str:
+    """Return a row of the table."""
+    return (
+        f' {point.series:<21} | {point.duration:<12.4g} | {point.rms_effort:<16.4g} | '
+        f'{point.nominal:<13.2g} | {point.worst:.4g}'
+    )
+
+
+def _write_csv(points: Sequence[TradeoffPoint], path: Path) -> None:
+    """Write all numbers."""
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file)
+        writer.writerow([field.name for field in fields(TradeoffPoint)])
+        writer.writerows(astuple(point) for point in points)
+    print(f'numbers: {path}')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

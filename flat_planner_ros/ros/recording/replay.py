@@ -1,0 +1,247 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the monitor would have said, from a recording."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+import json
+from typing import Any
+
+from flat_planner_ros.core.arm import FlatPlannerError, JointSample
+from flat_planner_ros.core.monitor import (
+    MonitorSettings,
+    PlannedMotion,
+    VibrationMonitor,
+    VibrationReport,
+)
+from flat_planner_ros.ros.parameters import monitor as monitor_parameters
+from flat_planner_ros.ros.recording.recording import Entry, Recording
+from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, of, PLAN, PLANNER
+from flat_planner_ros.ros.wire.message_types import message_class
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+
+SILENCE = 1.001
+"""Time after the last sample of a recording, relative to what counts as silence [-]."""
+
+SHOWN_BEFORE = 0.1
+"""Time before a motion of which samples are kept, relative to the motion [-]."""
+
+
+class NothingToJudge(FlatPlannerError):
+    """A recording without the topics that a report needs; the message names those it has."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sources:
+    """Names of the topics with the planned motions and with the measured joint states."""
+
+    plan: str
+    joint_states: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judgement:
+    """
+    A report and what it is about.
+
+    Attributes
+    ----------
+    report, motion
+        The verdict on what the motion left, and the motion.
+    times
+        Of the samples from shortly before the motion to the end of the window [s], shape (m,).
+    positions, efforts
+        Measured [rad], [N m], shape (m, n); efforts are NaN where unknown.
+
+    """
+
+    report: VibrationReport
+    motion: PlannedMotion
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    efforts: NDArray[np.float64]
+
+
+def find_sources(
+    recording: Recording, *, namespace: str = '', plan: str = '', joint_states: str = ''
+) -> Sources:
+    """
+    Return the topics to judge by.
+
+    Parameters
+    ----------
+    recording
+        Where they are.
+    namespace
+        Of the nodes, where the recording has several.
+    plan, joint_states
+        Names to take instead of the usual ones.
+
+    Raises
+    ------
+    NothingToJudge
+        There is no such topic, or more than one.
+
+    """
+    return Sources(
+        plan=_find(recording, JOINT_TRAJECTORY, plan, namespace, of(PLANNER, PLAN), '--plan'),
+        joint_states=_find(
+            recording, JOINT_STATE, joint_states, namespace, JOINT_STATES, '--joint-states'
+        ),
+    )
+
+
+def recorded_settings(recording: Recording, sources: Sources) -> list[tuple[int, MonitorSettings]]:
+    """Return the monitor's settings as recorded, each with the time from which it held [ns]."""
+    namespace = sources.plan.removesuffix('/' + of(PLANNER, PLAN))
+    known = {row.name for row in monitor_parameters.ROWS}
+    settings = []
+    for time, node, text in recording.parameters:
+        if node == f'{namespace}/{MONITOR}':
+            values = {k: v for k, v in json.loads(text).items() if k in known}
+            settings.append((time, monitor_parameters.build(values)))
+    return settings
+
+
+def replay(
+    recording: Recording, sources: Sources, settings: Sequence[tuple[int, MonitorSettings]]
+) -> list[Judgement]:
+    """
+    Return a report on each motion that a recording shows, as the monitor node makes it.
+
+    Parameters
+    ----------
+    recording
+        What was planned and measured.
+    sources
+        Where.
+    settings
+        At least one; each holds from its time on [ns], the first from the start.
+
+    """
+    player = _Player(settings[0][1])
+    changes = list(settings[1:])
+    for entry in recording.entries({sources.plan, sources.joint_states}):
+        while changes and changes[0][0] <= entry.time:
+            player.monitor.settings = changes.pop(0)[1]
+        player.take(entry)
+    player.end()
+    return player.judgements
+
+
+class _Player:
+    """
+    Feeds a monitor as its node does, but for the time: that comes with the stamps alone.
+
+    A recorder may have been late where the joint states were not.
+    """
+
+    def __init__(self, settings: MonitorSettings) -> None:
+        """Wait for a plan."""
+        self.monitor = VibrationMonitor(settings)
+        self.judgements: list[Judgement] = []
+        self._stamp: float | None = None
+        self._reader: conversions.JointStateReader | None = None
+        self._motions: list[PlannedMotion] = []
+        self._samples: list[JointSample] = []
+
+    def take(self, entry: Entry) -> None:
+        """Take a message; one that cannot be used is left out, as in the node."""
+        msg = deserialize_message(entry.message, message_class(entry.kind))
+        if not conversions.is_stamped(msg):
+            msg.header.stamp = conversions.time_msg(entry.time / conversions.NANOSECONDS)
+        take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
+        with suppress(FlatPlannerError):
+            take(msg)
+
+    def end(self) -> None:
+        """Judge a motion that is still watched: nothing more will come."""
+        if self._stamp is not None:
+            silence = SILENCE * self.monitor.settings.timeout
+            self._keep(self.monitor.tick(self._stamp + silence))
+
+    def _take_plan(self, msg: Any) -> None:
+        """Take a plan, for whatever joints it names."""
+        motion = conversions.planned_motion_from_trajectory(msg)
+        if self._reader is None or tuple(self._reader.joints) != motion.joint_names:
+            self.monitor.reset()
+            self._reader = conversions.JointStateReader(motion.joint_names)
+            self._samples.clear()
+        self._motions.append(motion)
+        self._keep(self.monitor.plan(motion))
+
+    def _take_state(self, msg: Any) -> None:
+        """Take a joint state."""
+        if self._reader is None:
+            return
+        sample = self._reader.read(msg)
+        self._stamp = sample.time
+        self._samples.append(sample)
+        self._keep(self.monitor.add(sample))
+
+    def _keep(self, report: VibrationReport | None) -> None:
+        """Keep a report with its motion and samples."""
+        if report is None:
+            return
+        motion = next(m for m in reversed(self._motions) if m.start == report.start_time)
+        first = motion.start - SHOWN_BEFORE * (motion.end - motion.start)
+        last = motion.end + self.monitor.settings.window
+        shown = [sample for sample in self._samples if first <= sample.time <= last]
+        unknown = np.full(len(motion.joint_names), np.nan)
+        self.judgements.append(
+            Judgement(
+                report=report,
+                motion=motion,
+                times=np.array([sample.time for sample in shown]),
+                positions=np.array([sample.positions for sample in shown]),
+                efforts=np.array([unknown if s.efforts is None else s.efforts for s in shown]),
+            )
+        )
+        # The next motion needs what came since this one began, at most.
+        self._samples = [sample for sample in self._samples if sample.time >= motion.start]
+
+
+def _find(
+    recording: Recording, kind: str, given: str, namespace: str, usual: str, option: str
+) -> str:
+    """Return the one topic of a type by its given or its usual name."""
+    of_kind = sorted(topic for topic, its in recording.topics.items() if its == kind)
+    if given:
+        wanted = '/' + given.strip('/')
+        found = [topic for topic in of_kind if topic == wanted]
+    elif namespace:
+        wanted = f'/{namespace.strip("/")}/{usual}'
+        found = [topic for topic in of_kind if topic == wanted]
+    else:
+        wanted = usual
+        found = [topic for topic in of_kind if topic.endswith('/' + usual)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise NothingToJudge(
+            f'several topics end in {usual}: {", ".join(found)}; choose with --namespace or '
+            f'{option}'
+        )
+    there = ', '.join(of_kind) or 'none'
+    raise NothingToJudge(
+        f'no topic {wanted} of type {kind}; name one with {option} (there: {there})'
+    )

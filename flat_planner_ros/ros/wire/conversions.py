@@ -1,0 +1,411 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages to core types and back; the only place where one becomes the other."""
+
+from array import array
+from collections.abc import Sequence
+from typing import TypeVar
+
+from builtin_interfaces.msg import Duration, Time
+from flat_planner_ros.core.arm import InvalidCommand, InvalidRequest, JointSample
+from flat_planner_ros.core.monitor import PlannedMotion, Residual, select
+from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
+from flat_planner_ros.core.plant import ArmState, EffortProfile
+from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
+from flat_planner_ros.ros.wire.point_reader import FIELDS, PointTable, read_points
+from flat_planner_ros.ros.wire.point_writer import NANOSECONDS, trajectory_bytes
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, Header
+from trajectory_msgs.msg import JointTrajectory
+
+FloatArray = NDArray[np.float64]
+
+Message = TypeVar('Message')
+
+MAX_GOAL_BYTES = 100_000
+"""Longest goal that is read; 51 points of seven joints take a tenth of it."""
+
+
+def seconds(time: Time | Duration) -> float:
+    """Return a stamp or a duration in seconds."""
+    return time.sec + time.nanosec / NANOSECONDS
+
+
+def time_msg(time: float) -> Time:
+    """Return the stamp of an absolute time [s]."""
+    sec, nanosec = _split(time)
+    return Time(sec=sec, nanosec=nanosec)
+
+
+def duration_msg(duration: float) -> Duration:
+    """Return the message of a duration [s]."""
+    sec, nanosec = divmod(round(duration * NANOSECONDS), NANOSECONDS)
+    return Duration(sec=sec, nanosec=nanosec)
+
+
+def message_of(data: bytes, message_type: type[Message]) -> Message:
+    """
+    Return a serialised goal as a message.
+
+    A message with a hundred thousand points takes seconds to become Python objects; its length
+    tells beforehand that it is no goal.
+
+    Raises
+    ------
+    RequestRejected
+        It is longer than any goal may be.
+
+    """
+    if len(data) > MAX_GOAL_BYTES:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal is {len(data)} bytes long, more than {MAX_GOAL_BYTES}',
+            value=float(len(data)),
+            limit=float(MAX_GOAL_BYTES),
+        )
+    try:
+        return deserialize_message(data, message_type)
+    except RuntimeError as error:
+        raise RequestRejected(
+            Reason.INVALID_GOAL, f'the goal cannot be read: {_first_line(error)}'
+        ) from error
+
+
+def points_of(data: bytes) -> PointTable:
+    """
+    Return a serialised trajectory as tables.
+
+    Raises
+    ------
+    InvalidRequest
+        It is no trajectory.
+
+    """
+    points = read_points(data)
+    if points is not None:
+        return points
+    try:
+        return points_of_message(deserialize_message(data, JointTrajectory))
+    except RuntimeError as error:
+        raise InvalidRequest(f'it cannot be read: {_first_line(error)}') from error
+
+
+def points_of_message(msg: JointTrajectory) -> PointTable:
+    """Return a trajectory as tables; arrays that do not fit the joints are told, not raised."""
+    count, fields, misfits = len(msg.joint_names), {}, {}
+    for field in FIELDS:
+        rows = [getattr(point, field) for point in msg.points]
+        width = count if any(map(len, rows)) else 0
+        odd = next((i for i, row in enumerate(rows) if len(row) != width), None)
+        if odd is None:
+            fields[field] = np.array(rows, dtype=float).reshape(len(rows), width)
+        else:
+            misfits[field] = f'point {odd} has {len(rows[odd])} {field} for {count} joints'
+    return PointTable(
+        joint_names=tuple(msg.joint_names),
+        stamp=seconds(msg.header.stamp),
+        times=np.array([seconds(point.time_from_start) for point in msg.points], dtype=float),
+        fields=fields,
+        misfits=misfits,
+    )
+
+
+def goal_from_trajectory(msg: JointTrajectory) -> Goal:
+    """
+    Return the goal that a trajectory message states, unchecked but for its length.
+
+    Raises
+    ------
+    RequestRejected
+        More points than any goal may have; they are not even copied.
+
+    """
+    check_point_count(len(msg.points))
+    points = tuple(
+        GoalPoint(
+            time=seconds(point.time_from_start),
+            positions=tuple(point.positions),
+            velocities=tuple(point.velocities),
+            accelerations=tuple(point.accelerations),
+            effort=tuple(point.effort),
+        )
+        for point in msg.points
+    )
+    return Goal(joint_names=tuple(msg.joint_names), points=points, stamp=_stamp(msg))
+
+
+def goal_from_joint_state(msg: JointState) -> Goal:
+    """Return the goal that a joint state states: a final pose, the duration left open."""
+    point = GoalPoint(
+        time=0.0,
+        positions=tuple(msg.position),
+        velocities=tuple(msg.velocity),
+        effort=tuple(msg.effort),
+    )
+    return Goal(joint_names=tuple(msg.name), points=(point,), stamp=_stamp(msg))
+
+
+class JointStateReader:
+    """
+    Reads joint states of a source that names its joints in the same order every time.
+
+    Names are looked up once, and compared as a whole from then on: at 1 kHz that counts.
+
+    Parameters
+    ----------
+    joints
+        Whose states are wanted, in this order.
+
+    """
+
+    def __init__(self, joints: Sequence[str]) -> None:
+        """Wait for the first message."""
+        self.joints = list(joints)
+        self._names: list[str] | None = None
+        self._indices: NDArray[np.intp] | slice = slice(None)
+
+    def read(self, msg: JointState) -> JointSample:
+        """
+        Return a measured state in the order of the arm's joints.
+
+        Its arrays may be views of the message's.
+
+        Parameters
+        ----------
+        msg
+            Joints by name, in any order, perhaps with others among them; velocity and effort may
+            be empty or NaN.
+
+        Raises
+        ------
+        InvalidRequest
+            A joint is missing or the arrays do not fit the names.
+
+        """
+        names = msg.name
+        if names != self._names:
+            self._indices = slice(None) if names == self.joints else select(names, self.joints)
+            self._names = names
+        count = len(names)
+        if len(msg.position) != count:
+            raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
+        return JointSample(
+            time=seconds(msg.header.stamp),
+            positions=np.frombuffer(msg.position)[self._indices],
+            velocities=_optional(msg.velocity, count, self._indices),
+            efforts=_optional(msg.effort, count, self._indices),
+        )
+
+
+def is_stamped(msg: JointState) -> bool:
+    """Return whether the message says when it was measured."""
+    stamp = msg.header.stamp
+    return bool(stamp.sec or stamp.nanosec)
+
+
+def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
+    """Return the motion that a plan states; see `planned_motion`."""
+    return planned_motion(points_of_message(msg))
+
+
+def planned_motion(points: PointTable) -> PlannedMotion:
+    """
+    Return the motion that a plan states.
+
+    Times are in seconds since the epoch, as stamped. That resolves 0.2 microseconds: it leaves the
+    amplitude of an oscillation within 1e-7 of itself, and residuals during a motion within that
+    time's travel, 1e-6 rad at 6 rad/s.
+
+    Raises
+    ------
+    InvalidRequest
+        The message is no complete, finite motion with an absolute start.
+
+    """
+    if not points.stamp:
+        raise InvalidRequest('a plan needs the absolute time of its start in header.stamp')
+    return PlannedMotion(
+        joint_names=points.joint_names,
+        start=points.stamp,
+        times=points.times,
+        positions=_table(points, 'positions'),
+        velocities=_optional_table(points, 'velocities'),
+        efforts=_optional_table(points, 'effort'),
+    )
+
+
+def effort_profile(points: PointTable, joints: Sequence[str], now: float) -> EffortProfile:
+    """
+    Return the command that a trajectory states.
+
+    Parameters
+    ----------
+    points
+        Joints in any order, the passive one with zero effort or left out; stamp 0 means now.
+    joints
+        The plant's joints, the passive one last.
+    now
+        Present time [s].
+
+    Raises
+    ------
+    InvalidCommand
+        The trajectory cannot be played as it stands.
+
+    """
+    names = list(points.joint_names)
+    if sorted(names) not in (sorted(joints), sorted(joints[:-1])):
+        raise InvalidCommand(f'joints are {names}, expected {list(joints)}')
+    try:
+        efforts = _table(points, 'effort')
+        positions = _optional_table(points, 'positions')
+        velocities = _optional_table(points, 'velocities')
+        accelerations = _optional_table(points, 'accelerations')
+    except InvalidRequest as error:
+        raise InvalidCommand(str(error)) from error
+    if joints[-1] in names and efforts[:, names.index(joints[-1])].any():
+        raise InvalidCommand(f'the passive joint {joints[-1]} cannot be given an effort')
+    # What is not played is a part of the command all the same: with it, all of it is broken.
+    for field, table in {
+        'positions': positions,
+        'velocities': velocities,
+        'accelerations': accelerations,
+    }.items():
+        if table is not None and not np.isfinite(table).all():
+            raise InvalidCommand(f'{field} must be finite')
+    actuated = select(names, joints[:-1])
+    return EffortProfile(
+        start=points.stamp or now,
+        times=points.times,
+        efforts=efforts[:, actuated],
+        positions=None if positions is None else positions[:, actuated],
+        velocities=None if velocities is None else velocities[:, actuated],
+    )
+
+
+def command_bytes(
+    track: Track,
+    joints: Sequence[str],
+    *,
+    include_passive_joint: bool = True,
+    include_effort: bool = True,
+    absolute_stamp: bool = True,
+) -> bytes:
+    """Return a command, serialised, as joint_trajectory_controller plays it."""
+    count = len(joints) if include_passive_joint else len(joints) - 1
+    tables = [track.positions, track.velocities, track.accelerations]
+    if include_effort:
+        tables.append(track.efforts)
+    start = track.start if absolute_stamp else 0.0
+    tables = [table[:, :count] for table in tables]
+    return trajectory_bytes(joints[:count], _split(start), track.times, tables)
+
+
+def flat_plan_bytes(track: Track) -> bytes:
+    """Return the flat outputs of a command and the higher derivatives of y1, serialised."""
+    flat = track.flat
+    names = [f'y{k + 1}' for k in range(len(flat))] + ['y1_d3']
+    tables = [np.vstack([flat[:, k], flat[0, k + 3]]).T for k in range(3)]
+    return trajectory_bytes(names, _split(track.start), track.times, tables)
+
+
+def effort_msg(efforts: FloatArray) -> Float64MultiArray:
+    """Return efforts of the actuated joints."""
+    return Float64MultiArray(data=_doubles(efforts))
+
+
+def reference_msg(samples: PlanSamples, joints: Sequence[str], now: float) -> JointState:
+    """Return what is planned for the present time."""
+    return _joint_state_msg(
+        joints, now, samples.positions[0], samples.velocities[0], samples.efforts[0]
+    )
+
+
+def joint_state_msg(state: ArmState, joints: Sequence[str]) -> JointState:
+    """Return the state of the plant."""
+    return _joint_state_msg(joints, state.time, state.position, state.velocity, state.effort)
+
+
+def residual_msg(header: Header, joints: Sequence[str], residual: Residual) -> JointState:
+    """Return deviations of positions and, where measured, velocities, stamped as measured."""
+    msg = JointState(header=header, name=joints, position=_doubles(residual.positions))
+    if residual.velocities is not None:
+        msg.velocity = _doubles(residual.velocities)
+    return msg
+
+
+def _joint_state_msg(
+    joints: Sequence[str],
+    time: float,
+    position: FloatArray,
+    velocity: FloatArray,
+    effort: FloatArray,
+) -> JointState:
+    """Return a joint state with full arrays."""
+    msg = JointState(name=list(joints))
+    msg.header.stamp = time_msg(time)
+    msg.position, msg.velocity = _doubles(position), _doubles(velocity)
+    msg.effort = _doubles(effort)
+    return msg
+
+
+def _split(time: float) -> tuple[int, int]:
+    """Return an absolute time [s] in seconds and nanoseconds."""
+    # Split first: a product of some 1e18 would round off the last hundred nanoseconds.
+    sec, fraction = divmod(time, 1.0)
+    carry, nanosec = divmod(round(fraction * NANOSECONDS), NANOSECONDS)
+    return int(sec) + carry, nanosec
+
+
+def _doubles(values: FloatArray) -> array:
+    """Return what a float64[] field takes without looking at every number."""
+    return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
+
+
+def _stamp(msg: JointTrajectory | JointState) -> float | None:
+    """Return the absolute time of a header, None for the stamp 0."""
+    return seconds(msg.header.stamp) or None
+
+
+def _first_line(error: Exception) -> str:
+    """Return what an error says, in one line."""
+    return str(error).partition('\n')[0]
+
+
+def _table(points: PointTable, field: str) -> FloatArray:
+    """Return one field of all points, shape (points, joints)."""
+    if field in points.misfits:
+        raise InvalidRequest(points.misfits[field])
+    table, count = points.fields[field], len(points.joint_names)
+    if len(table) and table.shape[1] != count:
+        raise InvalidRequest(f'point 0 has {table.shape[1]} {field} for {count} joints')
+    return table.reshape(len(table), count)
+
+
+def _optional_table(points: PointTable, field: str) -> FloatArray | None:
+    """Return one field of all points, None where no point has it."""
+    if field in points.fields and not points.fields[field].shape[1]:
+        return None
+    return _table(points, field)
+
+
+def _optional(values: array, count: int, indices: NDArray[np.intp] | slice) -> FloatArray | None:
+    """Return the wanted entries of an array that may be empty."""
+    if len(values) != count:
+        return None
+    return np.frombuffer(values)[indices]

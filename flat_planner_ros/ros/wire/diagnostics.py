@@ -1,0 +1,372 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Verdicts and reports as diagnostic messages: a sentence for people, pairs for tools."""
+
+from collections.abc import Mapping, Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.monitor import (
+    ActuatedJoints,
+    Adoption,
+    Level,
+    ReportedEstimate,
+    StiffnessEstimate,
+    VibrationReport,
+)
+from flat_planner_ros.core.planning import advice, baselines, predicted_residual, RequestRejected
+from flat_planner_ros.core.session import Ended, Goal, Motion, Outcome
+from flat_planner_ros.ros.wire.conversions import time_msg
+from flat_planner_ros.ros.wire.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
+
+ECHO_LENGTH = 16
+"""Most entries of a goal's list that a verdict repeats."""
+
+ECHO_CHARACTERS = 64
+"""Most characters of an entry that a verdict repeats."""
+
+LEVELS = {
+    Level.OK: DiagnosticStatus.OK,
+    Level.WARN: DiagnosticStatus.WARN,
+    Level.ERROR: DiagnosticStatus.ERROR,
+    Level.STALE: DiagnosticStatus.STALE,
+}
+"""Levels of a report as diagnostics state them."""
+
+ENDINGS = {
+    Outcome.FINISHED: 'has come to its end',
+    Outcome.STOPPED: 'has been brought to rest on the way',
+    Outcome.PREEMPTED: 'is replaced by a later goal',
+}
+"""What a verdict says of each end of a motion."""
+
+Values = Mapping[str, float | int | str | None]
+"""Keys and values of a status; None for what is not known."""
+
+
+def array_of(status: DiagnosticStatus, now: float) -> DiagnosticArray:
+    """Return a message with one status, stamped now [s]."""
+    msg = DiagnosticArray(status=[status])
+    msg.header.stamp = time_msg(now)
+    return msg
+
+
+def status_msg(name: str, level: bytes, message: str, values: Values) -> DiagnosticStatus:
+    """Return a status; keys without a value are left out."""
+    return DiagnosticStatus(
+        name=name,
+        level=level,
+        message=message,
+        values=[
+            KeyValue(key=key, value=_text(value))
+            for key, value in values.items()
+            if value is not None
+        ],
+    )
+
+
+def accepted_status(
+    motion: Motion,
+    goal: Goal,
+    joints: Sequence[str],
+    planning_time: float,
+    *,
+    with_advice: bool = True,
+    with_baselines: bool = False,
+) -> DiagnosticStatus:
+    """
+    Return the verdict on a goal that became a motion.
+
+    Parameters
+    ----------
+    motion, goal
+        What became of what.
+    joints
+        The arm's joints, whose order the plan's arrays follow.
+    planning_time
+        What it took [s].
+    with_advice, with_baselines
+        Whether to say when more time pays, and what simpler methods would leave behind.
+
+    """
+    plan = motion.plan
+    peaks = plan.peak_effort
+    strongest = int(peaks.argmax())
+    message = (
+        f'plan {motion.plan_id}: {plan.options.strategy.value}, {plan.request.duration:g} s, '
+        f'peak effort {peaks[strongest]:.4g} N m of {joints[strongest]}, '
+        f'starts at {motion.start:.3f} s'
+    )
+    values: dict[str, float | int | str | None] = {
+        **_of_motion(motion, 'ACCEPTED'),
+        'duration_min': motion.duration_min,
+        'planning_time': planning_time,
+        'boundary_residual': plan.boundary_residual,
+        'optimality_residual': plan.optimality_residual,
+        'cost': plan.cost_value,
+        **_of_residual(motion, with_advice=with_advice, with_baselines=with_baselines),
+    }
+    for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
+        values.update(_per_joint(quantity, joints, getattr(plan, quantity).tolist()))
+    level = DiagnosticStatus.OK
+    if motion.replaced_strategy is not None:
+        level = DiagnosticStatus.WARN
+        message += f'; not {motion.replaced_strategy.value}, which only plans from rest'
+    if motion.exceeded is not None:
+        use = motion.exceeded
+        level, name = DiagnosticStatus.WARN, joints[use.joint]
+        message += f'; stretched: as prescribed, {use.sentence(name)}'
+        values.update(joint=name, value=use.value, limit=use.limit, time=use.time)
+    return status_msg(STATUS_NAME, level, message, {**values, **_echo(goal)})
+
+
+def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStatus:
+    """Return the verdict on a goal that breaks a rule; None for one that was not even read."""
+    values: Values = {
+        'state': 'REJECTED',
+        'error_code': ERROR_CODES[error.reason],
+        'error_name': error.reason.value,
+        'joint': error.joint,
+        'value': _precise(error.value),
+        'limit': _precise(error.limit),
+        'time': error.time,
+        'duration_min': error.duration_min,
+        **({} if goal is None else _echo(goal)),
+    }
+    return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
+
+
+def ended_status(ended: Ended) -> DiagnosticStatus:
+    """Return the notice that a motion has ended, and how."""
+    motion, outcome = ended
+    message = f'plan {motion.plan_id} {ENDINGS[outcome]}'
+    values = _of_motion(motion, outcome.value)
+    return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
+
+
+def adopted_status(adoption: Adoption) -> DiagnosticStatus:
+    """Return the notice that the nominal model has changed."""
+    estimate, former, arm = adoption.estimate, adoption.former, adoption.arm
+    message = (
+        f'stiffness {former.stiffness:.6g} -> {arm.stiffness:.6g} N m/rad, damping '
+        f'{former.damping:.4g} -> {arm.damping:.4g} N m s/rad, estimated after the motion that '
+        f'started at {estimate.start_time:.3f} s'
+    )
+    values: Values = {
+        'state': 'ADOPTED',
+        'stiffness': arm.stiffness,
+        'stiffness_std': estimate.stiffness_std,
+        'stiffness_former': former.stiffness,
+        'damping': arm.damping,
+        'damping_std': estimate.damping_std,
+        'damping_former': former.damping,
+        'estimate_basis': estimate.case.value,
+        'start_time': f'{estimate.start_time:.9f}',
+    }
+    return status_msg(MODEL_NAME, DiagnosticStatus.OK, message, values)
+
+
+def reported_estimate(msg: DiagnosticArray) -> ReportedEstimate | None:
+    """
+    Return the estimate in a monitor's report, None if it has been withheld.
+
+    Raises
+    ------
+    InvalidRequest
+        The report has an estimate that cannot be read.
+
+    """
+    for status in msg.status:
+        values = {pair.key: pair.value for pair in status.values}
+        if status.name != REPORT_NAME or 'stiffness_estimate' not in values:
+            continue
+        try:
+            return ReportedEstimate(
+                start_time=float(values['start_time']),
+                joint=values['joint'],
+                stiffness=float(values['stiffness_estimate']),
+                stiffness_std=float(values['stiffness_std']),
+                damping=float(values['damping_estimate']),
+                damping_std=float(values['damping_std']),
+                case=ActuatedJoints(values['estimate_basis']),
+                inertia=float(values['estimate_inertia']),
+            )
+        except (KeyError, ValueError) as error:
+            raise InvalidRequest(f'estimate with missing or unreadable {error}') from error
+    return None
+
+
+def adopted_values(msg: DiagnosticArray) -> dict[str, float]:
+    """
+    Return stiffness and damping that a planner has adopted, nothing if the message is of goals.
+
+    Raises
+    ------
+    InvalidRequest
+        The values cannot be read.
+
+    """
+    adopted: dict[str, float] = {}
+    for status in msg.status:
+        if status.name == MODEL_NAME:
+            values = {pair.key: pair.value for pair in status.values}
+            try:
+                adopted = {name: float(values[name]) for name in ('stiffness', 'damping')}
+            except (KeyError, ValueError) as error:
+                raise InvalidRequest(
+                    f'adopted model with missing or unreadable {error}'
+                ) from error
+    return adopted
+
+
+def report_status(report: VibrationReport) -> DiagnosticStatus:
+    """Return what a motion has left behind."""
+    return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _of_report(report))
+
+
+def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> DiagnosticStatus:
+    """
+    Return the present state of a monitor.
+
+    Parameters
+    ----------
+    report
+        The last one, ``None`` before the first.
+    phase
+        What the monitor is waiting for.
+    dropped
+        Number of unusable samples [-].
+
+    """
+    state: Values = {'phase': phase, 'dropped_samples': dropped}
+    if report is None:
+        message = f'{phase}: no motion has been judged yet'
+        return status_msg(REPORT_NAME, DiagnosticStatus.OK, message, state)
+    message = f'{phase}; last motion: {report.message}'
+    return status_msg(REPORT_NAME, LEVELS[report.level], message, {**state, **_of_report(report)})
+
+
+def _of_report(report: VibrationReport) -> Values:
+    """Return the numbers of a report."""
+    seen = report.samples > 0
+    return {
+        'start_time': f'{report.start_time:.9f}',
+        'end_time': f'{report.end_time:.9f}',
+        'joint': report.joint,
+        'amplitude': report.amplitude,
+        'peak_to_peak': report.peak_to_peak,
+        'frequency': report.frequency,
+        'frequency_expected': report.frequency_expected,
+        'damping_ratio': report.damping_ratio,
+        'damping_expected': report.damping_expected,
+        'settling_time': report.settling_time,
+        'settled': report.settled if seen else None,
+        'bias': report.bias,
+        **_per_joint('final_error', report.joint_names, report.final_error),
+        **_per_joint('rms_effort', report.joint_names, report.rms_effort),
+        'window': report.window if seen else None,
+        'samples': report.samples,
+        'fit_rms': report.fit_rms,
+        **_of_estimate(report.estimate),
+    }
+
+
+def _of_estimate(estimate: StiffnessEstimate | None) -> Values:
+    """Return an estimate that can be trusted, else nothing."""
+    if estimate is None or not estimate.trustworthy or estimate.case is None:
+        return {}
+    return {
+        'stiffness_estimate': estimate.stiffness,
+        'stiffness_std': estimate.stiffness_std,
+        'damping_estimate': estimate.damping,
+        'damping_std': estimate.damping_std,
+        'estimate_basis': estimate.case.value,
+        'estimate_inertia': estimate.inertia,
+    }
+
+
+def _of_residual(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:
+    """Return what a motion is predicted to leave behind, and what others would."""
+    try:
+        residual = predicted_residual(motion.plan, motion.samples)
+    except InvalidRequest:
+        return {}  # an arm that does not oscillate leaves nothing to predict
+    box = residual.box
+    values: dict[str, float | int | str | None] = {
+        'predicted_residual': residual.nominal,
+        'predicted_residual_worst': residual.worst,
+        'predicted_residual_box': f'stiffness +-{100.0 * box.stiffness:g} %, '
+        f'damping +-{100.0 * box.damping:g} %',
+        'advice': advice(motion.plan, residual) if with_advice else None,
+    }
+    if with_baselines:
+        for point in baselines(motion.plan):
+            values[f'baseline.{point.series}.rms_effort'] = point.rms_effort
+            values[f'baseline.{point.series}.residual'] = point.nominal
+            values[f'baseline.{point.series}.residual_worst'] = point.worst
+    return values
+
+
+def _per_joint(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:
+    """Return a quantity of each joint, or of none."""
+    if not values:
+        return {}
+    return {f'{quantity}.{j}': value for j, value in zip(joints, values, strict=True)}
+
+
+def _of_motion(motion: Motion, state: str) -> Values:
+    """Return the values that tell which motion a status is about."""
+    options = motion.plan.options
+    return {
+        'plan_id': motion.plan_id,
+        'state': state,
+        'error_code': 0,
+        'error_name': 'SUCCESSFUL',
+        'strategy': options.strategy.value,
+        'flat_model': options.flat_model.value,
+        'duration': motion.plan.request.duration,
+        'start_time': f'{motion.start:.9f}',
+    }
+
+
+def _echo(goal: Goal) -> Values:
+    """Return the goal in brief: what it names, its final pose, its stamp."""
+    final = goal.points[-1] if goal.points else None
+    return {
+        'goal.joint_names': _list(goal.joint_names),
+        'goal.positions': _list(final.positions) if final else None,
+        'goal.time_from_start': final.time if final else None,
+        'goal.points': len(goal.points),
+        'goal.stamp': 0.0 if goal.stamp is None else f'{goal.stamp:.9f}',
+    }
+
+
+def _list(entries: Sequence[float | str]) -> str:
+    """Return the first entries of a list as text."""
+    shown = [_text(entry)[:ECHO_CHARACTERS] for entry in entries[:ECHO_LENGTH]]
+    more = ', ...' if len(entries) > ECHO_LENGTH else ''
+    return f'[{", ".join(shown)}{more}]'
+
+
+def _precise(value: float | None) -> str | None:
+    """Return a number that may be a time since 1970."""
+    return None if value is None else f'{value:.13g}'
+
+
+def _text(value: float | int | str) -> str:
+    """Return a number so that it reads well and is exact enough to compute with."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'{value:.9g}' if isinstance(value, float) else str(value)

@@ -1,0 +1,190 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Serialised trajectory messages, their points read as tables.
+
+The inverse of point_writer.py: what takes ten microseconds for each point as Python objects is one
+table of numbers where all points have arrays of equal lengths. Whatever is not exactly of that
+form is left to the middleware.
+"""
+
+from struct import Struct, unpack_from
+from typing import NamedTuple
+
+from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+FIELDS = ('positions', 'velocities', 'accelerations', 'effort')
+"""Arrays of a point in the order of the message."""
+
+ORDERS = {b'\0\0': '>', b'\0\1': '<'}
+"""Byte order by the representation that a message states: plain CDR, big or little endian."""
+
+HEADER = 4
+"""Bytes of the encapsulation; offsets count from its end."""
+
+LENGTH, DOUBLE = 4, 8
+"""Bytes of a sequence's length and of a number; each is aligned to its own size."""
+
+
+class PointTable(NamedTuple):
+    """
+    A trajectory, its points as tables.
+
+    Attributes
+    ----------
+    joint_names
+        As stated.
+    stamp
+        Of the header [s], 0 if there is none.
+    times
+        Of the points from the start [s], shape (m,).
+    fields
+        Tables by the names of the arrays, each of shape (m, width), width 0 if no point has any.
+    misfits
+        What is wrong with the arrays that are no table, by their names.
+
+    """
+
+    joint_names: tuple[str, ...]
+    stamp: float
+    times: FloatArray
+    fields: dict[str, FloatArray]
+    misfits: dict[str, str]
+
+
+class _Unusual(Exception):
+    """The message is not of the form that is read here."""
+
+
+def read_points(data: bytes) -> PointTable | None:
+    """
+    Return a trajectory from its bytes; None if only the middleware can tell what they mean.
+
+    Parameters
+    ----------
+    data
+        A trajectory_msgs/JointTrajectory with its encapsulation. Bytes after the last point are
+        not looked at, by the middleware neither: rclpy leaves room there.
+
+    """
+    order = ORDERS.get(data[:2])
+    if order is None:
+        return None
+    front = _Front(data, order)
+    try:
+        stamp = front.stamp()
+        front.string()
+        names = tuple([front.string() for _ in range(front.length(LENGTH))])
+        count = front.length(ARRAYS * LENGTH)
+        if not count:
+            return None
+        start = front.at
+        widths = front.widths()
+    except _Unusual:
+        return None
+    first = point_type(start, widths, order)
+    other = point_type(start + first.itemsize, widths, order)
+    rest = HEADER + start + first.itemsize
+    if rest + (count - 1) * other.itemsize > len(data):
+        return None
+    parts = (
+        np.frombuffer(data, first, count=1, offset=HEADER + start),
+        np.frombuffer(data, other, count=count - 1, offset=rest),
+    )
+    for field, width in enumerate(widths):
+        if (parts[1][f'length{field}'] != width).any():
+            return None
+    times = np.concatenate([part['sec'] + part['nanosec'] / NANOSECONDS for part in parts])
+    fields = {
+        name: np.concatenate([part[f'values{field}'] for part in parts], dtype=float)
+        if width
+        else np.empty((count, 0))
+        for field, (name, width) in enumerate(zip(FIELDS, widths, strict=True))
+    }
+    return PointTable(names, stamp, times, fields, misfits={})
+
+
+class _Front:
+    """
+    Reads what stands before the points, checking every length against what is left.
+
+    Parameters
+    ----------
+    data
+        The message.
+    order
+        Its byte order.
+
+    Attributes
+    ----------
+    at
+        Offset of the next entry from the end of the encapsulation.
+
+    """
+
+    def __init__(self, data: bytes, order: str) -> None:
+        """Begin after the encapsulation."""
+        self._data = data
+        self._length = Struct(f'{order}I')
+        self._stamp = f'{order}iI'
+        self.at = 0
+
+    def stamp(self) -> float:
+        """Return the stamp of the header [s]."""
+        begin = self._taken(2 * LENGTH)
+        sec, nanosec = unpack_from(self._stamp, self._data, begin)
+        return sec + nanosec / NANOSECONDS
+
+    def length(self, size: int) -> int:
+        """Return the length of a sequence whose entries take at least some bytes each."""
+        self.at += -self.at % LENGTH
+        (length,) = self._length.unpack_from(self._data, self._taken(LENGTH))
+        if length * size > len(self._data):
+            raise _Unusual
+        return length
+
+    def string(self) -> str:
+        """Return a string; it ends with its only zero."""
+        length = self.length(1)
+        begin = self._taken(length)
+        text = self._data[begin : begin + length]
+        if text.find(0) != length - 1:
+            raise _Unusual
+        try:
+            return text[:-1].decode()
+        except UnicodeDecodeError:
+            raise _Unusual from None
+
+    def widths(self) -> list[int]:
+        """Return the lengths of the arrays of a point that begins here."""
+        widths = []
+        for _ in range(ARRAYS):
+            widths.append(self.length(DOUBLE))
+            if widths[-1]:
+                self.at += -self.at % DOUBLE
+                self._taken(DOUBLE * widths[-1])
+        return widths
+
+    def _taken(self, size: int) -> int:
+        """Return where the next bytes begin in the message and go past them."""
+        begin = HEADER + self.at
+        if begin + size > len(self._data):
+            raise _Unusual
+        self.at += size
+        return begin

@@ -1,0 +1,150 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Insensitive motions and the predicted residual through the planner node."""
+
+from math import pi
+
+from core.conftest import ARM, envelope
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core import EffortProfile, FlatPlannerError, rollout
+from flat_planner_ros.ros.nodes.planner_node import PlannerNode
+from flat_planner_ros.ros.wire import interfaces
+import numpy as np
+import pytest
+from ros.world import ask, goal, STATUS
+from trajectory_msgs.msg import JointTrajectory
+
+REST = {'start.source': 'parameter', 'start.position': [0.0, 0.0], 'execute': False}
+
+
+class Planner:
+    """A planner that starts from given rest, and what it says."""
+
+    def __init__(self, graph, **parameters):
+        """Start it."""
+        self.graph = graph
+        graph.create(PlannerNode, {**REST, **parameters})
+        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
+        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
+
+    def send(self, angle=pi, duration=1.0):
+        """Send a goal for joint 1 and return the values of its verdict."""
+        before = len(self.status)
+        verdict = ask(self.graph, self.status, goal(angle, duration))
+        status = self.status[before].status[0]
+        self.level = status.level
+        return {**verdict, 'message': status.message}
+
+    def command(self):
+        """Return the points of the last plan."""
+        self.graph.expect(lambda: self.plans, 'a plan')
+        return self.plans[-1].points
+
+
+def simulated_amplitude(points, factor):
+    """Return what a plan leaves on an arm with another stiffness and damping."""
+    times = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in points]
+    efforts = np.array([[point.effort[0]] for point in points])
+    arm = ARM.scaled(stiffness=factor, damping=factor)
+    profile = EffortProfile(start=0.0, times=np.array(times), efforts=efforts)
+    motion = rollout(arm, profile, times[-1], step=5e-4)
+    return envelope(arm, motion.positions[-1, 1], motion.velocities[-1, 1])
+
+
+@pytest.mark.parametrize('nominal', ['exact', 'free'])
+def test_scenario_3_on_either_side(graph, nominal):
+    planner = Planner(graph, strategy='insensitive', **{'insensitivity.nominal': nominal})
+    verdict = planner.send()
+    assert verdict['state'] == 'ACCEPTED', verdict['message']
+    left = {f: simulated_amplitude(planner.command(), f) for f in (0.9, 1.0, 1.1)}
+    assert max(left.values()) <= 0.012
+    assert max(left.values()) <= float(verdict['predicted_residual_worst']) * 1.001
+    assert left[1.0] == pytest.approx(float(verdict['predicted_residual']), rel=1e-3)
+    last = planner.command()[-1]
+    assert list(last.positions) == [pi, 0.0]
+    for quantity in (last.velocities, last.accelerations, last.effort):
+        assert list(quantity) == [0.0, 0.0]
+
+
+def test_every_verdict_predicts_and_may_advise(graph):
+    planner = Planner(graph, strategy='min_potential_energy')
+    verdict = planner.send()
+    assert float(verdict['predicted_residual']) < 1e-6
+    assert float(verdict['predicted_residual_worst']) == pytest.approx(0.0841, abs=1e-4)
+    assert verdict['predicted_residual_box'] == 'stiffness +-10 %, damping +-10 %'
+    assert verdict['advice'].startswith('20 % longer (1.2 s) cuts the worst residual from 0.084')
+    assert not [key for key in verdict if key.startswith('baseline.')]
+    results = graph.set_parameters(
+        'flat_planner', report_baselines=True, report_advice=False, **{'flat_model': 'approximate'}
+    )
+    assert all(result.successful for result in results)
+    verdict = planner.send()
+    assert float(verdict['predicted_residual']) == pytest.approx(0.00297, abs=1e-5)
+    assert 'advice' not in verdict
+    assert float(verdict['baseline.zv_quintic.residual_worst']) == pytest.approx(0.106, abs=1e-3)
+    assert float(verdict['baseline.polynomial.rms_effort']) == pytest.approx(0.0083, abs=1e-4)
+
+
+def test_bounds_are_kept_or_the_goal_is_rejected(graph):
+    planner = Planner(graph, strategy='insensitive', **{'insensitivity.max_residual': 0.02})
+    assert float(planner.send()['predicted_residual_worst']) <= 0.0201
+    verdict = planner.send(duration=0.25)
+    assert verdict['error_name'] == 'SOLVER_FAILED'
+    assert float(verdict['value']) > float(verdict['limit']) == 0.02
+    assert 'longer duration' in verdict['message']
+
+
+def test_a_start_in_motion_says_what_is_planned_instead(graph):
+    planner = Planner(graph, strategy='insensitive', execute=True, **{'replan.lookahead': 1.0})
+    verdict = planner.send(duration=4.0)
+    assert planner.level == DiagnosticStatus.OK
+    assert verdict['strategy'] == 'insensitive'
+    verdict = planner.send(angle=1.0, duration=4.0)
+    assert planner.level == DiagnosticStatus.WARN
+    assert verdict['strategy'] == 'polynomial'
+    assert verdict['message'].startswith('plan 2: polynomial, 4 s')
+    assert 'not insensitive, which only plans from rest' in verdict['message']
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'insensitivity.max_residual': 0.1}, 'one of weight, max_effort_rms and max_residual'),
+        ({'flat_model': 'approximate'}, 'flat_model: exact'),
+        ({'insensitivity.modes': 100}, 'modes must be in [6, 48]'),
+        ({'insensitivity.stiffness': 0.95}, '0.95'),
+        ({'model.damping': 6.2e-4}, 'does not oscillate'),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(graph, changes, reason):
+    parameters = {'strategy': 'insensitive', 'insensitivity.weight': 100.0}
+    Planner(graph, **parameters)
+    (result,) = graph.set_parameters('flat_planner', **changes)
+    assert not result.successful
+    assert reason in result.reason or 'range' in result.reason
+
+
+def test_an_arm_that_does_not_oscillate_has_no_predicted_residual(graph):
+    model = {
+        'joints': ['joint1', 'joint2'],
+        'model.inertia_star': [6.4e-4, 3.3e-5],
+        'model.stiffness': 3.0e-3,
+        'model.damping': 2.0e-3,
+    }
+    verdict = Planner(graph, **model).send()
+    assert verdict['state'] == 'ACCEPTED'
+    assert 'predicted_residual' not in verdict
+    with pytest.raises(FlatPlannerError, match='does not oscillate'):
+        graph.create(PlannerNode, {**REST, **model, 'strategy': 'insensitive'})

@@ -1,0 +1,174 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""SIGINT, SIGTERM and a shutdown of the context end every program in every state: 0, no word."""
+
+import os
+from pathlib import Path
+import signal
+import sys
+
+import numpy as np
+import pytest
+
+CODE = 'import sys; from flat_planner_ros.programs import {0}; sys.exit({0}())'
+"""What an installed console script does."""
+
+PROGRAMS = ('planner_node', 'plant_node', 'monitor_node', 'demo')
+
+MOMENTS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 2.0)
+"""From catching signals to the first one [s]: imports, the opening of the graph, spinning."""
+
+SHUTDOWN = """
+import sys, threading
+from flat_planner_ros.ros.plant_node import main
+import rclpy
+threading.Timer({delay}, rclpy.try_shutdown).start()
+sys.exit(main())
+"""
+
+OVERTAKEN = """
+import sys
+from flat_planner_ros.ros.node_runner import run
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Overtaken(Node):
+    def __init__(self):
+        super().__init__('overtaken')
+        self.topic = self.create_publisher(String, 'topic', 1)
+        self.create_timer(0.01, self.on_tick)
+
+    def on_tick(self):
+        rclpy.shutdown()
+        self.topic.publish(String())
+
+sys.exit(run([Overtaken]))
+"""
+
+
+def start(graph, name, *arguments):
+    """Start a program as its console script does, and wait until it catches signals."""
+    process = graph.run([sys.executable, '-c', CODE.format(name), *arguments])
+    graph.expect(lambda: catches(process.pid, signal.SIGTERM), 'a handler of signals')
+    return process
+
+
+def catches(pid: int, number: int) -> bool:
+    """Return whether a process has a handler for a signal."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith('SigCgt:'):
+            return bool(int(line.split()[1], 16) >> (number - 1) & 1)
+    return False
+
+
+def assert_clean(process) -> None:
+    """Look at what a process leaves behind."""
+    assert process.wait() == 0, process.stderr
+    words = [line for line in process.stderr.splitlines() if '[INFO]' not in line]
+    assert words == []
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+
+
+@pytest.mark.parametrize('moment', MOMENTS)
+@pytest.mark.parametrize('name', PROGRAMS)
+def test_a_signal_at_any_moment_ends_a_program(graph, name, moment):
+    index = MOMENTS.index(moment) + PROGRAMS.index(name)
+    numbers = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGTERM)][index % 3]
+    process = start(graph, name)
+    graph.spin_until(lambda: False, moment)
+    for number in numbers:
+        if process.exit_code is None:
+            os.kill(process.pid, number)
+        graph.spin_until(lambda: False, 0.03 * (index % 2))
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_hail_of_signals_does_no_more_than_one(graph, seed):
+    process = start(graph, PROGRAMS[seed])
+    graph.spin_until(lambda: False, 0.4 * seed)
+    while process.exit_code is None:
+        os.kill(process.pid, signal.SIGINT if seed else signal.SIGTERM)
+        graph.spin_until(lambda: False, 0.005)
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.03, 0.06, 0.1, 0.15, 1.0])
+def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
+    process = graph.run([sys.executable, '-c', SHUTDOWN.format(delay=delay)])
+    if delay < 1.0:  # it may come before there is a context, and then does nothing
+        graph.spin_until(lambda: process.exit_code is not None, 3.0)
+        if process.exit_code is None:
+            process.stop()
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('executor', ['events', 'single'])
+def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
+    process = graph.run([sys.executable, '-c', OVERTAKEN], FLAT_PLANNER_EXECUTOR=executor)
+    assert_clean(process)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_tool_that_is_interrupted_ends_with_130_and_no_word(graph, number):
+    many = ['--stretch', *map(str, np.linspace(1.0, 3.0, 500))]
+    process = start(graph, 'tradeoff', '--final', '3.14', '--duration', '1', *many)
+    graph.spin_until(lambda: False, 0.5)
+    assert process.stop(number) == 130
+    assert process.stderr == ''
+
+
+def test_a_tool_whose_reader_goes_away_says_nothing(graph):
+    program = f"{sys.executable} -c '{CODE.format('flat_plan')}' joint1=1 --duration 1 --json -"
+    process = graph.run(['bash', '-c', f'{program} | head -c 10'])
+    assert process.wait() == 0
+    assert process.stderr == ''
+    assert len(process.stdout) == 10
+
+
+def test_a_program_says_that_it_is_ready_once(graph):
+    parameters = Path(__file__).resolve().parents[3] / 'config' / 'arm_2dof.yaml'
+    process = start(graph, 'plant_node', '--ros-args', '--params-file', str(parameters))
+    graph.expect(lambda: '[flat_plant]: ready' in process.stderr, 'a word')
+    graph.spin_until(lambda: False, 0.3)
+    assert process.stop() == 0
+    assert len(process.stderr.splitlines()) == 1
+
+
+BROKEN = {
+    'missing': (None, 'no such file'),
+    'no YAML': ('a: [1, 2\n b', 'params file'),
+    'no block': ('flat_plant:\n  publish_rate: 3.0\n', 'ros__parameters'),
+    'mixed list': ('/**:\n  ros__parameters:\n    joints: [a, 1]\n', 'same type'),
+}
+"""Parameter files and what is said of them."""
+
+
+@pytest.mark.parametrize('name', BROKEN)
+def test_a_parameter_file_that_cannot_be_read_ends_a_program_with_one_line(graph, tmp_path, name):
+    content, text = BROKEN[name]
+    file = tmp_path / 'parameters.yaml'
+    if content is not None:
+        file.write_text(content)
+    process = graph.run(
+        [sys.executable, '-c', CODE.format('demo'), '--ros-args', '--params-file', str(file)]
+    )
+    assert process.wait() == 1
+    (line,) = process.stderr.splitlines()
+    assert line.startswith('cannot start: ')
+    assert text in line
+    assert '.c:' not in line

@@ -1,0 +1,77 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The program that draws effort against residual, as a user runs it."""
+
+import csv
+from pathlib import Path
+
+from flat_planner_ros.ros.programs import tradeoff
+import pytest
+
+CONFIG = Path(__file__).resolve().parents[3] / 'config' / 'arm_2dof.yaml'
+MOTION = ['--final', '3.14159265', '--duration', '1', '--stretch', '1']
+
+
+def rows(path):
+    """Return the rows of a file of numbers."""
+    with path.open(encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+def test_numbers_and_a_picture(tmp_path, capsys):
+    pytest.importorskip('matplotlib')
+    numbers, picture = tmp_path / 'tradeoff.csv', tmp_path / 'tradeoff.png'
+    arguments = ['--params-file', str(CONFIG), *MOTION, '--csv', str(numbers)]
+    assert tradeoff.main([*arguments, '--plot', str(picture)]) == 0
+    found = rows(numbers)
+    polynomial = next(row for row in found if row['series'] == 'polynomial')
+    assert float(polynomial['worst']) == pytest.approx(0.119, abs=1e-3)
+    assert float(polynomial['rms_effort']) == pytest.approx(0.00828, abs=1e-5)
+    assert {row['series'] for row in found} >= {'insensitive_exact', 'insensitive_free'}
+    assert picture.read_bytes().startswith(b'\x89PNG')
+    assert picture.stat().st_size > 20_000
+    assert 'zvd_quintic' in capsys.readouterr().out
+
+
+def test_parameters_decide(tmp_path):
+    wide, narrow = tmp_path / 'wide.csv', tmp_path / 'narrow.csv'
+    tradeoff.main([*MOTION, '--csv', str(narrow)])
+    tradeoff.main([*MOTION, '--csv', str(wide), '-p', 'insensitivity.stiffness:=0.2'])
+    worst = [float(rows(path)[0]['worst']) for path in (narrow, wide)]
+    assert worst[1] > 1.5 * worst[0]
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'complaint'),
+    [
+        (['--params-file', 'none.yaml', *MOTION], 'cannot read none.yaml'),
+        ([*MOTION, '-p', 'insensitivity.stifness:=0.2'], 'did you mean insensitivity.stiff'),
+        (['--final', '1', '2', '3', '--duration', '1'], '3 angles for an arm of 2 joints'),
+        (['--final', '1', '--duration', '-1'], 'duration must be positive'),
+        ([*MOTION, '--csv', '/nowhere/numbers.csv'], 'No such file'),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(arguments, complaint, capsys):
+    assert tradeoff.main(arguments) == 1
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.count('\n') == 1
+
+
+def test_help_has_examples(capsys):
+    with pytest.raises(SystemExit) as ended:
+        tradeoff.main(['--help'])
+    assert ended.value.code == 0
+    assert 'tradeoff --final 3.14 0 --duration 1 --plot tradeoff.png' in capsys.readouterr().out
