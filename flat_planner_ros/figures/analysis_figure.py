@@ -17,11 +17,9 @@
 from pathlib import Path
 from textwrap import fill
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor import PlannedMotion, VibrationReport
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 MILLI = 1e3
 """Residuals are drawn in mrad."""

@@ -22,8 +22,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 import numpy as np
-from numpy.typing import NDArray
 
 GOAL_ANGLE = np.pi
 """Final angle of joint 1 [rad]; the arm starts at 0."""
@@ -144,9 +144,9 @@ class Recording(NamedTuple):
 
     """
 
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    efforts: NDArray[np.float64]
+    times: FloatArray
+    positions: FloatArray
+    efforts: FloatArray
 
 
 class Result(NamedTuple):

@@ -14,6 +14,7 @@
 
 """Arm: the model. Links, dynamics, counterbalances, flat map; its errors and measured samples."""
 
+from flat_planner_ros.core.arm.arrays import FloatArray
 from flat_planner_ros.core.arm.counterbalance import (
     Counterbalances,
     counterbalances,
@@ -57,6 +58,7 @@ __all__ = [
     'FlatMap',
     'FlatModel',
     'FlatPlannerError',
+    'FloatArray',
     'InvalidCommand',
     'InvalidCost',
     'InvalidModel',

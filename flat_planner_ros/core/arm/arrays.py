@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Linear algebra of one vector, as a simulation asks for it, or of a stack of vectors."""
+"""Arrays: their type, and linear algebra of one vector or of a stack of vectors."""
 
 from collections.abc import Callable
 from functools import cache
@@ -20,25 +20,26 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.float64]
+"""Values in double precision, of any shape."""
 
 
-def applied(matrix: Array, vector: Array) -> Array:
+def applied(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the product of a matrix (..., n, n) with each vector (..., n), shape (..., n)."""
     # The first case is what simulations ask for, 4000 times per simulated second.
-    product: Array = (
+    product: FloatArray = (
         matrix.dot(vector) if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0]
     )
     return product
 
 
-def times_matrix(vector: Array, matrix: Array) -> Array:
+def times_matrix(vector: FloatArray, matrix: FloatArray) -> FloatArray:
     """Return the product of each vector (..., n) with one matrix (n, n), shape (..., n)."""
-    product: Array = vector.dot(matrix)
+    product: FloatArray = vector.dot(matrix)
     return product
 
 
-def solved(matrix: Array, vector: Array) -> Array:
+def solved(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     """
     Return the solutions of linear systems, shape (..., n).
 
@@ -52,21 +53,21 @@ def solved(matrix: Array, vector: Array) -> Array:
     """
     if vector.ndim == 1:
         # A quarter of the time of numpy's, which looks after stacks; symmetric: .T is a view.
-        solution: Array = _positive_definite_solver()(matrix.T, vector, overwrite_a=1)[1]
+        solution: FloatArray = _positive_definite_solver()(matrix.T, vector, overwrite_a=1)[1]
         return solution
     return np.asarray(np.linalg.solve(matrix, vector[..., None])[..., 0], dtype=float)
 
 
 @cache
-def _positive_definite_solver() -> Callable[..., tuple[Array, Array, int]]:
+def _positive_definite_solver() -> Callable[..., tuple[FloatArray, FloatArray, int]]:
     """Return LAPACK's dposv; slow to import, and only arms with coupled links need it."""
     from scipy.linalg.lapack import dposv
 
     return dposv  # type: ignore[no-any-return]
 
 
-def last_of(values: Array) -> Array:
+def last_of(values: FloatArray) -> FloatArray:
     """Return the last entry of each vector (..., n), shape (...)."""
     # A scalar, not an array without axes: ten times faster in what follows.
-    last: Array = values[-1] if values.ndim == 1 else values[..., -1]
+    last: FloatArray = values[-1] if values.ndim == 1 else values[..., -1]
     return last

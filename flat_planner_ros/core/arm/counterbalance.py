@@ -21,12 +21,11 @@ docs/derivation.md). Link n comes first: its counterbalance rides on link n-1.
 
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm.arrays import FloatArray
 from flat_planner_ros.core.arm.errors import InvalidModel
 from flat_planner_ros.core.arm.links import checked_vector
 import numpy as np
 import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 BALANCED = 2
 """Links that must be balanced, the last ones."""
@@ -48,8 +47,8 @@ class Counterbalances(NamedTuple):
 
     """
 
-    mass: Array
-    arm: Array
+    mass: FloatArray
+    arm: FloatArray
 
 
 def counterbalances(
@@ -160,7 +159,7 @@ def remedy(
 
 def displaced_com(
     link_com: npt.ArrayLike, link_mass: npt.ArrayLike, imbalance: npt.ArrayLike
-) -> Array:
+) -> FloatArray:
     """
     Return the links' centres of mass after balance has been lost.
 

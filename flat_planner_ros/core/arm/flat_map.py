@@ -24,11 +24,9 @@ I_n (I_{n-1} - I_n) / k.
 from dataclasses import dataclass
 from enum import Enum
 
+from flat_planner_ros.core.arm.arrays import FloatArray
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 class FlatModel(Enum):

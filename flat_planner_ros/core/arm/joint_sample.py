@@ -16,10 +16,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
+from flat_planner_ros.core.arm.arrays import FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)

@@ -17,11 +17,10 @@
 from math import inf
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm.arrays import FloatArray
 from flat_planner_ros.core.arm.errors import InvalidModel
 import numpy as np
 import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 DEFINITE_TOLERANCE = 1e-12
 """Smallest eigenvalue of an admitted inertia matrix scaled to unit diagonal [-]."""
@@ -36,12 +35,14 @@ COUPLING_TOLERANCE = 1e-9
 class Load(NamedTuple):
     """Inertia (n, n) [kg m^2], static moment (n,) [kg m] and carried mass (n,) [kg]."""
 
-    inertia: Array
-    static_moment: Array
-    carried_mass: Array
+    inertia: FloatArray
+    static_moment: FloatArray
+    carried_mass: FloatArray
 
 
-def chain_load(length: Array, link: npt.NDArray[np.intp], place: Array, mass: Array) -> Load:
+def chain_load(
+    length: FloatArray, link: npt.NDArray[np.intp], place: FloatArray, mass: FloatArray
+) -> Load:
     """
     Return the load of point masses, each riding at a place on a link of a chain.
 
@@ -55,7 +56,7 @@ def chain_load(length: Array, link: npt.NDArray[np.intp], place: Array, mass: Ar
 
 def checked_links(
     length: npt.ArrayLike, com: npt.ArrayLike, mass: npt.ArrayLike, inertia: npt.ArrayLike
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the four link arrays, checked."""
     n = np.size(length)
     return (
@@ -66,14 +67,14 @@ def checked_links(
     )
 
 
-def per_motor(value: npt.ArrayLike | None, motors: int) -> Array:
+def per_motor(value: npt.ArrayLike | None, motors: int) -> FloatArray:
     """Return one number per actuated joint, zeros for None."""
     return np.zeros(motors) if value is None else np.array(value, dtype=float)
 
 
 def checked_vector(
     name: str, value: npt.ArrayLike, size: int, unit: str, lower: float = -inf
-) -> Array:
+) -> FloatArray:
     """Return a locked copy, shape (size,), of finite numbers not below a bound."""
     array = np.array(value, dtype=float)
     if array.shape != (size,):
@@ -86,7 +87,7 @@ def checked_vector(
     return array
 
 
-def check_definite(inertia: Array) -> None:
+def check_definite(inertia: FloatArray) -> None:
     """
     Refuse coefficients h of a mass matrix that is not positive definite in every pose.
 
@@ -115,7 +116,9 @@ def check_definite(inertia: Array) -> None:
         )
 
 
-def check_realizable(inertia: Array, static_moment: Array, carried_mass: Array) -> None:
+def check_realizable(
+    inertia: FloatArray, static_moment: FloatArray, carried_mass: FloatArray
+) -> None:
     """
     Refuse inertias and static moments that no masses on a chain have together.
 

@@ -24,7 +24,7 @@ from functools import cached_property
 from math import sqrt
 from typing import NamedTuple, TypeVar
 
-from flat_planner_ros.core.arm.arrays import applied, last_of, solved, times_matrix
+from flat_planner_ros.core.arm.arrays import applied, FloatArray, last_of, solved, times_matrix
 from flat_planner_ros.core.arm.errors import InvalidModel, NotFlat
 from flat_planner_ros.core.arm.links import (
     chain_load,
@@ -37,8 +37,7 @@ from flat_planner_ros.core.arm.links import (
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Real = TypeVar('Real', float, Array)
+Real = TypeVar('Real', float, FloatArray)
 
 BALANCE_TOLERANCE = 1e-6
 """Largest static moment of a balanced link, relative to sqrt(carried mass * inertia) [-]."""
@@ -121,14 +120,14 @@ class PlanarArm:
 
     """
 
-    inertia: Array
-    static_moment: Array
-    carried_mass: Array
+    inertia: FloatArray
+    static_moment: FloatArray
+    carried_mass: FloatArray
     stiffness: float
     damping: float
     gravity: float
-    viscous_friction: Array
-    coulomb_friction: Array
+    viscous_friction: FloatArray
+    coulomb_friction: FloatArray
 
     def __post_init__(self) -> None:
         """Refuse what is no physical arm and lock the arrays."""
@@ -317,12 +316,12 @@ class PlanarArm:
         return InertiaStar(float(self.inertia[-2, -2]) + last, last)
 
     @property
-    def stiffness_matrix(self) -> Array:
+    def stiffness_matrix(self) -> FloatArray:
         """Return the paper's K_n, shape (n, n) [N m/rad]."""
         return np.diag(np.append(np.zeros(self.n - 1), self.stiffness))
 
     @property
-    def damping_matrix(self) -> Array:
+    def damping_matrix(self) -> FloatArray:
         """Return the paper's C_n, shape (n, n) [N m s/rad]."""
         return np.diag(np.append(np.zeros(self.n - 1), self.damping))
 
@@ -350,19 +349,19 @@ class PlanarArm:
                     f'(mass * arm) by {moment:+.12g} kg m',
                 )
 
-    def mass_matrix(self, q: Array) -> Array:
+    def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Return M(q) [kg m^2], shape (..., n, n), at joint angles q [rad], shape (..., n)."""
         return self._sum.T @ self._link_inertia(_apart(np.cumsum(q, axis=-1))) @ self._sum
 
-    def coriolis(self, q: Array, dq: Array) -> Array:
+    def coriolis(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """Return the Coriolis-centrifugal effort b [N m], shape (..., n), at q, dq [rad/s]."""
         return self._centrifugal(_apart(np.cumsum(q, axis=-1)), dq) @ self._sum
 
-    def gravity_effort(self, q: Array) -> Array:
+    def gravity_effort(self, q: FloatArray) -> FloatArray:
         """Return the effort g(q) that holds the arm against gravity [N m], shape (..., n)."""
         return self._weight(np.cumsum(q, axis=-1)) @ self._sum
 
-    def friction(self, dq: Array) -> Array:
+    def friction(self, dq: FloatArray) -> FloatArray:
         """Return what friction takes from the actuated joints [N m], shape (..., n-1)."""
         motor = dq[..., :-1]
         return self.viscous_friction * motor + self.coulomb_friction * np.tanh(
@@ -373,7 +372,7 @@ class PlanarArm:
         """Return the effort of spring and damper -k q_n - c dq_n [N m]."""
         return -self.stiffness * q_n - self.damping * dq_n
 
-    def inverse_dynamics(self, q: Array, dq: Array, ddq: Array) -> Array:
+    def inverse_dynamics(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """
         Return the generalised effort that a motion takes.
 
@@ -384,7 +383,7 @@ class PlanarArm:
 
         Returns
         -------
-        Array
+        FloatArray
             Effort [N m], shape (..., n), friction included; 0 at the passive joint of any motion
             that motors at the other joints can bring about.
 
@@ -394,7 +393,7 @@ class PlanarArm:
         effort[..., -1] -= self.passive_effort(q[..., -1], dq[..., -1])
         return effort
 
-    def rigid_effort(self, q: Array, dq: Array, ddq: Array) -> Array:
+    def rigid_effort(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Return the effort M ddq + b + g of a motion, without friction and spring, (..., n)."""
         theta = np.cumsum(q, axis=-1)
         cos, sin = np.cos(theta), np.sin(theta)
@@ -402,10 +401,10 @@ class PlanarArm:
         # cos and sin of differences by the addition theorems: in n angles, not in n^2 differences.
         torque = cos * ((cos * along - sin * across) @ self.inertia + self._static_load)
         torque += sin * ((sin * along + cos * across) @ self.inertia)
-        effort: Array = torque @ self._sum
+        effort: FloatArray = torque @ self._sum
         return effort
 
-    def forward_dynamics(self, q: Array, dq: Array, effort: Array) -> Array:
+    def forward_dynamics(self, q: FloatArray, dq: FloatArray, effort: FloatArray) -> FloatArray:
         """
         Return the joint accelerations under motor efforts.
 
@@ -418,7 +417,7 @@ class PlanarArm:
 
         Returns
         -------
-        Array
+        FloatArray
             Accelerations [rad/s^2], shape (..., n).
 
         """
@@ -438,12 +437,12 @@ class PlanarArm:
             load -= self._weight(theta)
         return times_matrix(solved(self._link_inertia(apart), load), self._difference.T)
 
-    def energy(self, q: Array, dq: Array) -> Array:
+    def energy(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """Return kinetic, gravitational and elastic energy together [J], shape (...)."""
         theta, rate = np.cumsum(q, axis=-1), np.cumsum(dq, axis=-1)
         momentum = applied(self._link_inertia(_apart(theta)), rate)
         weight = self.gravity * self.static_moment * np.sin(theta)
-        links: Array = np.sum(rate * momentum / 2 + weight, axis=-1)
+        links: FloatArray = np.sum(rate * momentum / 2 + weight, axis=-1)
         return links - q[..., -1] * self.passive_effort(q[..., -1], np.zeros_like(links)) / 2
 
     def natural_mode(self, *, held: bool = False) -> NaturalMode:
@@ -466,30 +465,30 @@ class PlanarArm:
         frequency = sqrt(self.stiffness / inertia)
         return NaturalMode(frequency, self.damping / (2 * inertia * frequency))
 
-    def _link_inertia(self, apart: Array) -> Array:
+    def _link_inertia(self, apart: FloatArray) -> FloatArray:
         """Return H(theta), shape (..., n, n)."""
         return self.inertia * np.cos(apart)
 
-    def _centrifugal(self, apart: Array, dq: Array) -> Array:
+    def _centrifugal(self, apart: FloatArray, dq: FloatArray) -> FloatArray:
         """Return the centrifugal torque on each link, shape (..., n)."""
         return applied(self.inertia * np.sin(apart), dq.cumsum(axis=-1) ** 2)
 
-    def _weight(self, theta: Array) -> Array:
+    def _weight(self, theta: FloatArray) -> FloatArray:
         """Return the torque that holds each link against gravity, shape (..., n)."""
         return self._static_load * np.cos(theta)
 
     @cached_property
-    def _sum(self) -> Array:
+    def _sum(self) -> FloatArray:
         """S: absolute link angles are S q, joint efforts are S^T times link torques."""
         return np.tri(self.n)
 
     @cached_property
-    def _difference(self) -> Array:
+    def _difference(self) -> FloatArray:
         """Inverse of S."""
         return np.eye(self.n) - np.eye(self.n, k=-1)
 
     @cached_property
-    def _inverse_mass(self) -> Array | None:
+    def _inverse_mass(self) -> FloatArray | None:
         """Inverse of M where no link is coupled to another, so that M is constant."""
         own = np.sqrt(np.diag(self.inertia))
         coupling = np.triu(np.abs(self.inertia), k=1)
@@ -498,7 +497,7 @@ class PlanarArm:
         return self._difference @ np.diag(own**-2) @ self._difference.T
 
     @cached_property
-    def _static_load(self) -> Array:
+    def _static_load(self) -> FloatArray:
         """Torque that holds each link when it points along x, shape (n,) [N m]."""
         return self.gravity * self.static_moment
 
@@ -512,6 +511,6 @@ class PlanarArm:
         return self.gravity != 0.0 and bool(self.static_moment.any())
 
 
-def _apart(theta: Array) -> Array:
+def _apart(theta: FloatArray) -> FloatArray:
     """Return theta_i - theta_j, shape (..., n, n)."""
     return theta[..., :, None] - theta[..., None, :]

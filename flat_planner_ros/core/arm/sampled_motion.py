@@ -16,10 +16,8 @@
 
 from bisect import bisect_right
 
+from flat_planner_ros.core.arm.arrays import FloatArray
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 
 class SampledMotion:
@@ -38,7 +36,9 @@ class SampledMotion:
 
     """
 
-    def __init__(self, times: Array, positions: Array, velocities: Array | None) -> None:
+    def __init__(
+        self, times: FloatArray, positions: FloatArray, velocities: FloatArray | None
+    ) -> None:
         """Form the polynomials of all intervals at once."""
         # By hand: scipy's spline costs ten times as much per call, and 0.3 s at the first import.
         self._times: list[float] = times.tolist()
@@ -60,7 +60,7 @@ class SampledMotion:
             axis=2,
         )
 
-    def at(self, time: float) -> tuple[Array, Array]:
+    def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return position [rad] and velocity [rad/s], shape (n,), on the points' time axis [s]."""
         after = bisect_right(self._times, time)
         if after == 0 or after == len(self._times):

@@ -32,6 +32,7 @@ from flat_planner_ros.core.arm import (
     flat_map,
     FlatMap,
     FlatModel,
+    FloatArray,
     OutOfReach,
     PlanarArm,
 )
@@ -56,7 +57,6 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 GAP = 5e-3

@@ -25,12 +25,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
 
-from flat_planner_ros.core.arm import FlatMap
+from flat_planner_ros.core.arm import FlatMap, FloatArray
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 CONTACT = 3
 """

@@ -24,11 +24,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 MAX_HALF_WIDTH = 0.9

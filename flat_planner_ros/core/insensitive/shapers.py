@@ -23,11 +23,8 @@ nominal oscillation apart, so that their oscillations cancel on the nominal arm 
 from enum import Enum
 from math import comb, exp, pi, sqrt
 
-from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 class Shaper(Enum):

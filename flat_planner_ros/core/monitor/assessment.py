@@ -16,8 +16,9 @@
 
 from math import sqrt
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
-from flat_planner_ros.core.monitor.motion_record import Array, PlannedMotion, Record
+from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.monitor.report import Level, MonitorSettings, VibrationReport
 import numpy as np
@@ -108,7 +109,7 @@ def assess(
 
 
 def _estimate(
-    elapsed: Array, errors: Array, fit: OscillationFit, settings: MonitorSettings
+    elapsed: FloatArray, errors: FloatArray, fit: OscillationFit, settings: MonitorSettings
 ) -> StiffnessEstimate | None:
     """Return stiffness and damping if there is a model of the joints that are planned."""
     arm, joints = settings.arm, errors.shape[1]
@@ -120,7 +121,7 @@ def _estimate(
 
 
 def _settling_time(
-    elapsed: Array, errors: Array, band: float, frequency: float | None
+    elapsed: FloatArray, errors: FloatArray, band: float, frequency: float | None
 ) -> float | None:
     """Return when the errors stay within the band, seen for half a period at least."""
     outside = np.flatnonzero(np.abs(errors) > band)
@@ -132,7 +133,7 @@ def _settling_time(
     return float(elapsed[first]) if first else 0.0
 
 
-def _time_mean(times: Array, rows: Array, start: float) -> tuple[float, ...]:
+def _time_mean(times: FloatArray, rows: FloatArray, start: float) -> tuple[float, ...]:
     """Return each column's mean from start to the last sample, linear between samples."""
     if times.size == 0:
         return ()
@@ -144,7 +145,9 @@ def _time_mean(times: Array, rows: Array, start: float) -> tuple[float, ...]:
     return tuple(_integral(np.interp(grid, times, column), grid) / span for column in rows.T)
 
 
-def _rms_effort(times: Array, efforts: Array, joint: int, motion: PlannedMotion) -> float | None:
+def _rms_effort(
+    times: FloatArray, efforts: FloatArray, joint: int, motion: PlannedMotion
+) -> float | None:
     """Return the time RMS of a joint's effort, or None if the samples have a hole."""
     known = np.isfinite(efforts[:, joint])
     duration = motion.end - motion.start
@@ -164,7 +167,7 @@ def load_libraries() -> None:
     import scipy.optimize  # noqa: F401  Loading is the purpose.
 
 
-def _integral(values: Array, grid: Array) -> float:
+def _integral(values: FloatArray, grid: FloatArray) -> float:
     """Return the integral of samples that are joined linearly."""
     from scipy.integrate import trapezoid  # here: slow to import, and only needed for a report
 

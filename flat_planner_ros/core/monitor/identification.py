@@ -19,9 +19,9 @@ from enum import Enum
 from math import hypot, pi, sqrt
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.monitor.oscillation import OscillationFit
-from flat_planner_ros.core.monitor.oscillation_search import Array, basis_columns, solve_linear
+from flat_planner_ros.core.monitor.oscillation_search import basis_columns, solve_linear
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -220,7 +220,7 @@ class _Response(NamedTuple):
 
     amplitude: complex
     std: float
-    left: Array
+    left: FloatArray
     correlation: float
 
 
@@ -235,7 +235,7 @@ def _pole(fit: OscillationFit) -> _Pole:
     )
 
 
-def _response(t: Array, y: Array, pole: _Pole) -> _Response:
+def _response(t: FloatArray, y: FloatArray, pole: _Pole) -> _Response:
     """Return how much of a signal oscillates with a pole, beside a straight line."""
     span = float(np.ptp(t))
     basis = basis_columns(t / span, span * np.array((pole.omega, pole.decay)))
@@ -249,7 +249,7 @@ def _response(t: Array, y: Array, pole: _Pole) -> _Response:
     return _Response(complex(linear[2], -linear[3]), sqrt(variance), left, correlation)
 
 
-def _step(column: Array) -> float:
+def _step(column: FloatArray) -> float:
     """Return the step of the encoder of which all samples are multiples, 0 if there is none."""
     levels = np.unique(column)
     if levels.size in (1, column.size):

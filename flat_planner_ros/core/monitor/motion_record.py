@@ -19,11 +19,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import InvalidRequest, SampledMotion
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, SampledMotion
 import numpy as np
 from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 RECORD_LIMIT = 8192
 """Most rows of a record; a longer one keeps every second, fourth, ... row [-]."""
@@ -56,10 +54,10 @@ class PlannedMotion:
 
     joint_names: tuple[str, ...]
     start: float
-    times: Array
-    positions: Array
-    velocities: Array | None = None
-    efforts: Array | None = None
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray | None = None
+    efforts: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no motion, and lock the arrays."""
@@ -85,9 +83,9 @@ class PlannedMotion:
         return self.start + float(self.times[-1])
 
     @property
-    def final(self) -> Array:
+    def final(self) -> FloatArray:
         """Return the last positions [rad], shape (n,)."""
-        final: Array = self.positions[-1]
+        final: FloatArray = self.positions[-1]
         return final
 
     def is_same(self, other: 'PlannedMotion') -> bool:
@@ -106,7 +104,7 @@ class PlannedMotion:
             )
         )
 
-    def reference(self, time: float) -> tuple[Array, Array]:
+    def reference(self, time: float) -> tuple[FloatArray, FloatArray]:
         """
         Return what is planned at an absolute time; at rest before and after the motion.
 
@@ -117,7 +115,7 @@ class PlannedMotion:
 
         Returns
         -------
-        tuple of Array
+        tuple of FloatArray
             Positions [rad] and velocities [rad/s], both of shape (n,), by cubic Hermite
             interpolation if velocities are planned, else by linear interpolation.
 
@@ -133,8 +131,8 @@ class PlannedMotion:
 class Residual(NamedTuple):
     """Measured minus wanted positions [rad] and velocities [rad/s] or ``None``, shape (n,)."""
 
-    positions: Array
-    velocities: Array | None
+    positions: FloatArray
+    velocities: FloatArray | None
 
 
 class Record:
@@ -159,7 +157,7 @@ class Record:
         """Return the number of rows held."""
         return self._count
 
-    def append(self, time: float, row: Array | float) -> None:
+    def append(self, time: float, row: FloatArray | float) -> None:
         """Add a row; a full record first drops every second one and goes on half as dense."""
         if self._skip:
             self._skip -= 1
@@ -175,7 +173,7 @@ class Record:
         self._count += 1
         self._skip = self._stride - 1
 
-    def between(self, start: float, end: float) -> tuple[Array, Array]:
+    def between(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
         """Return copies of the times [s], shape (m,), and rows, shape (m, width), in between."""
         table = self._table[: self._count]
         inside = table[(table[:, 0] >= start) & (table[:, 0] <= end)]
@@ -211,7 +209,7 @@ def select(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.intp]:
     return np.array([place[name] for name in wanted], dtype=np.intp)
 
 
-def _locked(name: str, values: Array, shape: tuple[int, ...]) -> Array:
+def _locked(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
     """Return a read-only copy of finite values of the wanted shape."""
     array = np.array(values, dtype=float)
     if array.shape != shape:
@@ -222,7 +220,7 @@ def _locked(name: str, values: Array, shape: tuple[int, ...]) -> Array:
     return array
 
 
-def _equal(mine: Array | None, its: Array | None) -> bool:
+def _equal(mine: FloatArray | None, its: FloatArray | None) -> bool:
     """Return whether both are missing or equal in every number."""
     if mine is None or its is None:
         return mine is its

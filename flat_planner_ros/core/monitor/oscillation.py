@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 from math import exp, hypot, log, pi, sqrt
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest
 from flat_planner_ros.core.monitor.oscillation_search import (
-    Array,
     basis_columns,
     best_rates,
     DAMPING_LIMIT,
@@ -168,8 +167,8 @@ def fit_oscillation(times: ArrayLike, values: ArrayLike, end_time: float) -> Osc
 class _Scaled(NamedTuple):
     """Samples (u, y) scaled to unit time and size; first time from T, time unit, size, noise."""
 
-    u: Array
-    y: Array
+    u: FloatArray
+    y: FloatArray
     start: float
     span: float
     offset: float
@@ -206,14 +205,14 @@ def _fit_scaled(samples: _Scaled, still: OscillationFit) -> OscillationFit:
     return _with_oscillation(fit, samples, rates, linear[2:], covariance[2:, 2:])
 
 
-def _least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
+def _least_squares(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the linear unknowns of least squares and what they leave."""
     _, linear = solve_linear(columns, y)
     return linear, y - columns @ linear
 
 
 def _with_line(
-    fit: OscillationFit, samples: _Scaled, linear: Array, left: Array
+    fit: OscillationFit, samples: _Scaled, linear: FloatArray, left: FloatArray
 ) -> OscillationFit:
     """Return the fit with bias and drift in SI units and what the fit leaves."""
     return replace(
@@ -225,7 +224,11 @@ def _with_line(
 
 
 def _with_oscillation(
-    fit: OscillationFit, samples: _Scaled, rates: Array, phases: Array, covariance: Array
+    fit: OscillationFit,
+    samples: _Scaled,
+    rates: FloatArray,
+    phases: FloatArray,
+    covariance: FloatArray,
 ) -> OscillationFit:
     """Return the fit with envelope at T, rates and standard errors; covariance of (a, b, w, s)."""
     envelope = hypot(phases[0], phases[1])

@@ -24,10 +24,8 @@ from collections.abc import Callable
 from math import pi
 from typing import Any
 
+from flat_planner_ros.core.arm import FloatArray
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 ROUNDOFF = 4.0 * float(np.finfo(float).eps)
 """Size of rounding errors relative to the largest value [-]."""
@@ -60,7 +58,7 @@ MAX_EVALUATIONS = 60
 """Most evaluations of one refinement [-]."""
 
 
-def basis_columns(u: Array, rates: Array) -> Array:
+def basis_columns(u: FloatArray, rates: FloatArray) -> FloatArray:
     """Return the linear unknowns' columns for rates (w, s) per unit of u: (m, 4)."""
     w, s = rates
     envelope = np.exp(-s * u)
@@ -68,14 +66,14 @@ def basis_columns(u: Array, rates: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def rate_columns(u: Array, basis: Array, linear: Array) -> Array:
+def rate_columns(u: FloatArray, basis: FloatArray, linear: FloatArray) -> FloatArray:
     """Return the derivatives of the fitted signal with respect to (w, s): (m, 2)."""
     cosine, sine = basis[:, 2], basis[:, 3]
     a, b = linear[2], linear[3]
     return np.stack((u * (b * cosine - a * sine), -u * (a * cosine + b * sine)), axis=-1)
 
 
-def solve_linear(basis: Array, y: Array) -> tuple[Array, Array]:
+def solve_linear(basis: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the orthonormal columns (m, 4) and the linear unknowns (4,) of least squares."""
     q, r = np.linalg.qr(basis)
     # A decay within one long gap leaves an empty column: any finite unknown will do for it.
@@ -83,7 +81,7 @@ def solve_linear(basis: Array, y: Array) -> tuple[Array, Array]:
     return q, np.linalg.solve(r, q.T @ y)
 
 
-def _starts(u: Array, y: Array) -> Array:
+def _starts(u: FloatArray, y: FloatArray) -> FloatArray:
     """Return undamped starts at the highest peaks of the resampled signal's spectrum: (c, 2)."""
     count = int(min(round(1.0 / float(np.median(np.diff(u)))) + 1, SPECTRUM_SAMPLES))
     grid = np.linspace(0.0, 1.0, count)
@@ -101,7 +99,7 @@ def _starts(u: Array, y: Array) -> Array:
     return np.stack((w, np.zeros_like(w)), axis=-1)
 
 
-def best_rates(u: Array, y: Array) -> Array:
+def best_rates(u: FloatArray, y: FloatArray) -> FloatArray:
     """
     Return the rates of the oscillation that fits best beside a straight line.
 
@@ -114,7 +112,7 @@ def best_rates(u: Array, y: Array) -> Array:
 
     Returns
     -------
-    Array
+    FloatArray
         Angular frequency and decay (w, s) per unit of u [-], shape (2,).
 
     """
@@ -127,7 +125,9 @@ def best_rates(u: Array, y: Array) -> Array:
     return np.asarray(best.x, dtype=float)
 
 
-def _descend(u: Array, y: Array, start: Array, lower: Array, upper: Array) -> Any:
+def _descend(
+    u: FloatArray, y: FloatArray, start: FloatArray, lower: FloatArray, upper: FloatArray
+) -> Any:
     """Return scipy's result of the separable least-squares problem from one start."""
     from scipy.optimize import least_squares  # here for the same reason
 
@@ -144,14 +144,16 @@ def _descend(u: Array, y: Array, start: Array, lower: Array, upper: Array) -> An
     )
 
 
-def _separable(u: Array, y: Array) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+def _separable(
+    u: FloatArray, y: FloatArray
+) -> tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], FloatArray]]:
     """Return residual (m,) and Kaufman's Jacobian (m, 2) as functions of the rates."""
 
-    def residual(rates: Array) -> Array:
+    def residual(rates: FloatArray) -> FloatArray:
         q, _ = solve_linear(basis_columns(u, rates), y)
         return y - q @ (q.T @ y)
 
-    def jacobian(rates: Array) -> Array:
+    def jacobian(rates: FloatArray) -> FloatArray:
         basis = basis_columns(u, rates)
         q, linear = solve_linear(basis, y)
         slopes = rate_columns(u, basis, linear)

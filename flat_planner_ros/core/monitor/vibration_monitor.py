@@ -17,9 +17,9 @@
 from enum import Enum
 from math import inf, isfinite, nan
 
-from flat_planner_ros.core.arm import InvalidRequest, JointSample
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, JointSample
 from flat_planner_ros.core.monitor.assessment import assess
-from flat_planner_ros.core.monitor.motion_record import Array, PlannedMotion, Record, Residual
+from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record, Residual
 from flat_planner_ros.core.monitor.report import MonitorSettings, VibrationReport
 import numpy as np
 
@@ -309,7 +309,7 @@ def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> st
     )
 
 
-def _speed(sample: JointSample) -> Array:
+def _speed(sample: JointSample) -> FloatArray:
     """Return how fast each joint moves at most, shape (n,) [rad/s]."""
     if sample.velocities is None:
         return np.full(sample.positions.shape, UNKNOWN_SPEED)

@@ -24,12 +24,12 @@ from cmath import exp
 from functools import cache, lru_cache
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.modes import leibniz, Number, series_derivatives
 from flat_planner_ros.core.motion_law.roots import Cluster
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 CONDITIONS = 6

@@ -23,11 +23,8 @@ from dataclasses import dataclass, InitVar
 from enum import Enum
 from functools import cache
 
-from flat_planner_ros.core.arm import FlatMap, InvalidCost
+from flat_planner_ros.core.arm import FlatMap, FloatArray, InvalidCost
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 ORDER = 6
 """Highest derivative in the cost; the motion law solves an equation of twice this order."""

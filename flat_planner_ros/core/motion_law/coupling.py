@@ -27,13 +27,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import UncertifiedPlan
+from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.segment_basis import SegmentBasis, SOLUTIONS
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 RESIDUAL_STEPS = 3
 """Corrections of the solved weights by the residual of the conditions."""

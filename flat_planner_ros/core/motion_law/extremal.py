@@ -28,15 +28,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from flat_planner_ros.core.arm import UncertifiedPlan
+from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, Block, block_of, CONDITIONS
 from flat_planner_ros.core.motion_law.law import MotionLaw
 from flat_planner_ros.core.motion_law.modes import Mode
 from flat_planner_ros.core.motion_law.roots import Cluster, clusters
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 _ORDERS = np.arange(CONDITIONS + 1.0)
 

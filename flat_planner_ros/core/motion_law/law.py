@@ -22,11 +22,10 @@ them, so that one set serves any distance and any place.
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.modes import Mode, mode_sum, ModeSum, TOP_ORDER
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 MAX_DERIVATIVE = 1e150
 """Largest derivative of a planned variable; its square, as in a cost, has room [rad/s^k]."""

@@ -28,10 +28,10 @@ from itertools import pairwise, zip_longest
 from math import comb
 from typing import NamedTuple, TypeVar
 
+from flat_planner_ros.core.arm import FloatArray
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Number = TypeVar('Number', np.float64, np.complex128)
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import cache
 from math import ceil, log2
 
-from flat_planner_ros.core.arm import InvalidRequest, strict_arithmetic
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, strict_arithmetic
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
 from flat_planner_ros.core.motion_law.coupling import coupling, Weights
@@ -34,9 +34,6 @@ from flat_planner_ros.core.motion_law.piecewise_law import PiecewiseLaw
 from flat_planner_ros.core.motion_law.segment_basis import segment_basis, SegmentBasis, SOLUTIONS
 from flat_planner_ros.core.motion_law.unit_motion import rounded
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 PROBES = 8
 """Even times at which each half of a segment is certified, besides those near its ends."""

@@ -16,11 +16,10 @@
 
 from dataclasses import dataclass
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.law import MotionLaw
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

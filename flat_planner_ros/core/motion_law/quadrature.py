@@ -19,11 +19,11 @@ from functools import cache
 from itertools import pairwise
 from math import ceil, log2
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.law import MotionLaw
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 NODES_PER_PANEL = 16

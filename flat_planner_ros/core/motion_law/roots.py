@@ -26,10 +26,10 @@ from collections.abc import Iterable, Sequence
 from functools import cache, cached_property
 from typing import NamedTuple, TypeVar
 
+from flat_planner_ros.core.arm import FloatArray
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
 Number = TypeVar('Number', np.float64, np.complex128)

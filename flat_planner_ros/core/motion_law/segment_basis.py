@@ -24,13 +24,11 @@ from cmath import exp
 from dataclasses import dataclass
 from functools import lru_cache
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, Block, block_of, CONDITIONS
 from flat_planner_ros.core.motion_law.modes import leibniz, Mode, series_derivatives
 from flat_planner_ros.core.motion_law.roots import Spectrum
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 SOLUTIONS = 2 * CONDITIONS
 """Solutions of the equation, and derivatives of each that are coupled: orders 0 to 11."""

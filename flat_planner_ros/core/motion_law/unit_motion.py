@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.extremal import (
     momentum_of,
@@ -33,9 +34,6 @@ from flat_planner_ros.core.motion_law.extremal import (
 from flat_planner_ros.core.motion_law.law import MotionLaw
 from flat_planner_ros.core.motion_law.quadrature import half_quadrature
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 JET_ORDER = 6
 """Highest derivative of the planned variable that joint motions and the flat plan need."""

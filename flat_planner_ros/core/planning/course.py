@@ -23,13 +23,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
-from flat_planner_ros.core.arm import apply_row
+from flat_planner_ros.core.arm import apply_row, FloatArray
 from flat_planner_ros.core.motion_law import CONDITIONS, JET_ORDER, motion_quadrature, MotionLaw
 from flat_planner_ros.core.planning.task import even_times, Task
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-FloatArray = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 
 class Law(Protocol):

@@ -25,13 +25,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law import CONDITIONS
 from flat_planner_ros.core.planning.plan import Plan
 from flat_planner_ros.core.planning.plan_samples import PlanSamples
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 DEGREE = 16

@@ -18,13 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.plan import Plan
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Excess that counts as rounding, relative to the limit; for positions also to 1 rad [-]."""

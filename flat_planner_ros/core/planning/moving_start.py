@@ -16,6 +16,7 @@
 
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     extremals,
@@ -27,9 +28,6 @@ from flat_planner_ros.core.motion_law import (
 )
 from flat_planner_ros.core.planning.task import Task
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 class CertifiedLaws(NamedTuple):

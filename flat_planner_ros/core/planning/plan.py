@@ -19,16 +19,13 @@ from functools import cached_property
 from math import ceil
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import apply_row, FlatMap, UncertifiedPlan
+from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law import QuadraticCost
 from flat_planner_ros.core.planning.course import Course, Law, RestToRest
 from flat_planner_ros.core.planning.plan_samples import PlanSamples
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.planning.task import even_times, Task
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 BOUNDARY_TOLERANCE = 1e-9
 """Largest miss of an accepted law at its ends, relative to that derivative's peak [-]."""

@@ -17,11 +17,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from flat_planner_ros.core.arm import FlatMap, PlanarArm
+from flat_planner_ros.core.arm import FlatMap, FloatArray, PlanarArm
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 FLAT_ORDERS = 6
 """Derivatives of the flat outputs in a plan, the values included."""

@@ -19,6 +19,7 @@ from math import inf
 
 from flat_planner_ros.core.arm import (
     FlatModel,
+    FloatArray,
     InvalidRequest,
     PlanarArm,
     strict_arithmetic,
@@ -39,11 +40,9 @@ from flat_planner_ros.core.planning.shaped_course import shaped_course
 from flat_planner_ros.core.planning.task import Task, task_of
 from flat_planner_ros.core.planning.via_times import path_of
 import numpy as np
-from numpy.typing import NDArray
 
 __all__ = ['Law', 'MotionRequest', 'Plan', 'plan', 'PlanningOptions', 'PlanSamples', 'ViaPoint']
 
-FloatArray = NDArray[np.float64]
 
 NO_DISTANCE = 1e-100
 """Distance below which a motion rests: its derivatives would leave double precision [rad]."""

@@ -17,13 +17,10 @@
 from dataclasses import dataclass, field, replace
 from math import isfinite
 
-from flat_planner_ros.core.arm import FlatModel, InvalidRequest
+from flat_planner_ros.core.arm import FlatModel, FloatArray, InvalidRequest
 from flat_planner_ros.core.insensitive import Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

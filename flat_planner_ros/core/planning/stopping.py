@@ -20,16 +20,13 @@ planned variable is zero at the end ((S2) of docs/derivation.md); it is linear i
 so that two laws tell where that is.
 """
 
-from flat_planner_ros.core.arm import UncertifiedPlan
+from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law import CONDITIONS, momentum_of
 from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.plan import Plan
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 SHORTEST = 1.0 / 16.0
 """Shortest stop that is considered, in terms of the rest of the motion [-]."""

@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from flat_planner_ros.core.arm import flat_map, FlatMap, PlanarArm, strict_arithmetic
+from flat_planner_ros.core.arm import flat_map, FlatMap, FloatArray, PlanarArm, strict_arithmetic
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     GRIDS_KEPT,
@@ -31,8 +31,6 @@ from flat_planner_ros.core.motion_law import (
 from flat_planner_ros.core.planning.request import PlanningOptions
 import numpy as np
 from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 MAX_NUMBER = 1e300
 """Largest number in a plan; products with weights of order one still have room."""

@@ -18,15 +18,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning.plan import Plan
 from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 REASONS = {
     Quantity.POSITION: Reason.POSITION_LIMIT,

@@ -21,7 +21,7 @@ Nothing here is simulated: every residual is the integral of `robustness` over t
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.insensitive import (
     Nominal,
     predict_residual,
@@ -35,9 +35,6 @@ from flat_planner_ros.core.planning.plan_samples import PlanSamples
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 INTERVALS = 1000
 """

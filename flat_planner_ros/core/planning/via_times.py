@@ -24,7 +24,7 @@ from dataclasses import replace
 from functools import partial
 from math import inf
 
-from flat_planner_ros.core.arm import PlanarArm, UncertifiedPlan
+from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedPlan
 from flat_planner_ros.core.motion_law import CONDITIONS, optimal_path, Path, QuadraticCost
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
@@ -34,9 +34,6 @@ from flat_planner_ros.core.planning.request import (
 )
 from flat_planner_ros.core.planning.task import Task, task_of
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 LEAST_SHARE = 0.05
 """

@@ -16,12 +16,10 @@
 
 from math import inf
 
-from flat_planner_ros.core.arm import InvalidModel, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidModel, PlanarArm
 from flat_planner_ros.core.plant.effort_profile import JointReference
 import numpy as np
 import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 
 class Drives:
@@ -69,13 +67,13 @@ class Drives:
         self.idle = JointReference(nothing, missing, missing)
         """What stands for no command; its arrays are known by being these very ones."""
 
-    def feed_forward(self, reference: JointReference, q: Array) -> Array:
+    def feed_forward(self, reference: JointReference, q: FloatArray) -> FloatArray:
         """Return what is applied without looking at errors, shape (n-1,) [N m]."""
         if self.arm.has_weight and reference.effort is self.idle.effort:
             return self.arm.gravity_effort(q)[:-1]
         return reference.effort
 
-    def asked(self, reference: JointReference, q: Array, dq: Array) -> Array:
+    def asked(self, reference: JointReference, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
         Return feed-forward and feedback, before the motors' limits.
 
@@ -88,7 +86,7 @@ class Drives:
 
         Returns
         -------
-        Array
+        FloatArray
             Shape (n-1,) [N m].
 
         """
@@ -101,7 +99,7 @@ class Drives:
             + self._feedback_d * (reference.velocity - dq[:-1])
         )
 
-    def limited(self, effort: Array) -> Array:
+    def limited(self, effort: FloatArray) -> FloatArray:
         """Return what the motors can give, the very same array if that is all of it."""
         if not self._is_limited:
             return effort
@@ -111,7 +109,7 @@ class Drives:
 
 def _per_motor(
     name: str, value: npt.ArrayLike | None, motors: int, default: float, unit: str
-) -> Array:
+) -> FloatArray:
     """Return one non-negative number per motor."""
     array = np.full(motors, default) if value is None else np.array(value, dtype=float)
     if array.shape != (motors,):

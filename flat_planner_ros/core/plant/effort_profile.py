@@ -19,11 +19,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import InvalidCommand, SampledMotion
+from flat_planner_ros.core.arm import FloatArray, InvalidCommand, SampledMotion
 import numpy as np
 import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 MAX_EFFORT = 1e6
 """Largest effort of a command [N m]: no motor of a robot gives more, a broken sender may."""
@@ -47,17 +45,17 @@ class JointReference(NamedTuple):
 
     """
 
-    effort: Array
-    position: Array
-    velocity: Array
+    effort: FloatArray
+    position: FloatArray
+    velocity: FloatArray
 
 
 class _Course(NamedTuple):
     """Efforts that are linear in time between knots; times from the command's start [s]."""
 
     times: list[float]
-    efforts: Array
-    slopes: Array
+    efforts: FloatArray
+    slopes: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,12 +84,12 @@ class EffortProfile:
     """
 
     start: float
-    times: Array
-    efforts: Array
-    positions: Array | None = None
-    velocities: Array | None = None
+    times: FloatArray
+    efforts: FloatArray
+    positions: FloatArray | None = None
+    velocities: FloatArray | None = None
     anchor_time: float | None = None
-    anchor_effort: Array | None = None
+    anchor_effort: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be played and lock the arrays."""
@@ -147,13 +145,13 @@ class EffortProfile:
         """Return a copy that starts from an effort (n-1,) [N m] applied at a time [s]."""
         return replace(self, anchor_time=at, anchor_effort=np.asarray(effort, dtype=float))
 
-    def effort(self, t: float) -> Array:
+    def effort(self, t: float) -> FloatArray:
         """Return the effort at an absolute time [s], shape (n-1,) [N m]."""
         course, elapsed = self._course, t - self.start
         i = bisect_right(course.times, elapsed) - 1
         if i < 0:
             return self._before
-        effort: Array = course.efforts[i] + course.slopes[i] * (elapsed - course.times[i])
+        effort: FloatArray = course.efforts[i] + course.slopes[i] * (elapsed - course.times[i])
         return effort
 
     def reference(self, t: float) -> JointReference:
@@ -181,7 +179,7 @@ class EffortProfile:
         object.__setattr__(self, name, array if shape else float(array))
 
     @cached_property
-    def _before(self) -> Array:
+    def _before(self) -> FloatArray:
         """Effort before the first knot."""
         return np.zeros(self.motors) if self.anchor_effort is None else self.anchor_effort
 
@@ -203,7 +201,7 @@ class EffortProfile:
         return _Course(times.tolist(), efforts, np.vstack((slopes, np.zeros(self.motors))))
 
 
-def locked(name: str, value: npt.ArrayLike, unit: str) -> Array:
+def locked(name: str, value: npt.ArrayLike, unit: str) -> FloatArray:
     """Return a locked copy of finite numbers."""
     array = np.array(value, dtype=float, order='C')
     if not np.isfinite(array).all():
@@ -212,7 +210,7 @@ def locked(name: str, value: npt.ArrayLike, unit: str) -> Array:
     return array
 
 
-def check_bound(name: str, values: Array, bound: float, unit: str) -> None:
+def check_bound(name: str, values: FloatArray, bound: float, unit: str) -> None:
     """Refuse numbers that no robot has to do with."""
     largest = float(np.abs(values).max())
     if largest > bound:

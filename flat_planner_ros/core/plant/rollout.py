@@ -16,13 +16,11 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.arm import FloatArray, PlanarArm
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import SimulatedArm
 import numpy as np
 import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 
 class Rollout(NamedTuple):
@@ -38,9 +36,9 @@ class Rollout(NamedTuple):
 
     """
 
-    times: Array
-    positions: Array
-    velocities: Array
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray
 
 
 def rollout(

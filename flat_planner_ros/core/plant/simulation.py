@@ -21,7 +21,7 @@ Nothing here knows of flatness or planning, so that the simulated arm can prove 
 from math import floor, inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import InvalidCommand, InvalidModel, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidModel, PlanarArm
 from flat_planner_ros.core.plant.drives import Drives
 from flat_planner_ros.core.plant.effort_profile import (
     check_bound,
@@ -33,8 +33,6 @@ from flat_planner_ros.core.plant.effort_profile import (
 )
 import numpy as np
 import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 GRID_TOLERANCE = 1e-6
 """A grid time ahead of the present by less counts as reached, relative to the step [-]."""
@@ -63,9 +61,9 @@ class ArmState(NamedTuple):
     """
 
     time: float
-    position: Array
-    velocity: Array
-    effort: Array
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
 
 
 class SimulatedArm:
@@ -143,17 +141,17 @@ class SimulatedArm:
         return self._origin + self._count * self._step
 
     @property
-    def position(self) -> Array:
+    def position(self) -> FloatArray:
         """Return a copy of the joint angles, shape (n,) [rad]."""
         return self._position.copy()
 
     @property
-    def velocity(self) -> Array:
+    def velocity(self) -> FloatArray:
         """Return a copy of the joint velocities, shape (n,) [rad/s]."""
         return self._velocity.copy()
 
     @property
-    def applied_effort(self) -> Array:
+    def applied_effort(self) -> FloatArray:
         """Return what acts now: motors after feedback and limit, then the spring (n,) [N m]."""
         q, dq, drives = self._position, self._velocity, self._drives
         given = drives.limited(drives.asked(self._reference(self.time), q, dq))
@@ -313,7 +311,7 @@ class SimulatedArm:
         self._clipped_steps += self._is_clipped
         return end
 
-    def _stop(self, velocity: Array) -> None:
+    def _stop(self, velocity: FloatArray) -> None:
         """Stand still where the arm is, because of velocities (n,) [rad/s] without sense."""
         worst = int(np.argmax(np.abs(velocity)))
         self._fault = (
@@ -329,7 +327,9 @@ class SimulatedArm:
         if self._fault:
             raise InvalidCommand(f'the arm has been stopped until it is reset: {self._fault}')
 
-    def _acceleration(self, reference: JointReference, q: Array, dq: Array) -> Array:
+    def _acceleration(
+        self, reference: JointReference, q: FloatArray, dq: FloatArray
+    ) -> FloatArray:
         """Return joint accelerations, shape (n,) [rad/s^2]."""
         asked = self._drives.asked(reference, q, dq)
         given = self._drives.limited(asked)

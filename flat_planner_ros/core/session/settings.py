@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import inf
 
-from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.planning import (
     JointLimits,
     OnViolation,
@@ -27,10 +27,6 @@ from flat_planner_ros.core.planning import (
     RequestRejected,
     Timing,
 )
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_FOUND = 3600.0
 """Longest duration that is looked for where the settings name none [s]."""

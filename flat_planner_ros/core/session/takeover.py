@@ -16,14 +16,11 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import JointSample
+from flat_planner_ros.core.arm import FloatArray, JointSample
 from flat_planner_ros.core.planning import CONDITIONS, Reason, RequestRejected
 from flat_planner_ros.core.session.settings import SessionSettings
 from flat_planner_ros.core.session.timeline import Motion, Timeline
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 
 class Origin(NamedTuple):

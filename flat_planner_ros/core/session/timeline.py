@@ -24,11 +24,9 @@ seam (docs/derivation.md, section S).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.planning import LimitUse, Plan, PlanSamples, Strategy
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 SEAM_TOLERANCE = 1e-6
 """Points of an old motion this close to the start of the next one give way to its first [s]."""

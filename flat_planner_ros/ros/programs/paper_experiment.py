@@ -21,6 +21,7 @@ from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.figures.paper_example import (
     DURATION,
     GOAL_ANGLE,
@@ -32,7 +33,6 @@ from flat_planner_ros.figures.paper_example import (
 from flat_planner_ros.ros.parameters.declaration import EXAMPLE_ARM
 from flat_planner_ros.ros.wire import conversions, interfaces
 import numpy as np
-from numpy.typing import NDArray
 from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
 from rclpy.client import Client
@@ -353,7 +353,7 @@ def _recording(states: Sequence[JointState], start: float) -> Recording:
     )
 
 
-def _planned_efforts(plan: JointTrajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _planned_efforts(plan: JointTrajectory) -> tuple[FloatArray, FloatArray]:
     """Return times [s] and efforts of joint 1 [N m]."""
     motion = conversions.planned_motion_from_trajectory(plan)
     return motion.times, motion.efforts[:, 0]

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import json
 from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError, JointSample
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, JointSample
 from flat_planner_ros.core.monitor import (
     MonitorSettings,
     PlannedMotion,
@@ -33,7 +33,6 @@ from flat_planner_ros.ros.wire import conversions
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, of, PLAN, PLANNER
 from flat_planner_ros.ros.wire.message_types import message_class
 import numpy as np
-from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -76,9 +75,9 @@ class Judgement:
 
     report: VibrationReport
     motion: PlannedMotion
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    efforts: NDArray[np.float64]
+    times: FloatArray
+    positions: FloatArray
+    efforts: FloatArray
 
 
 def find_sources(

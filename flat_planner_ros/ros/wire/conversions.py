@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from builtin_interfaces.msg import Duration, Time
-from flat_planner_ros.core.arm import InvalidCommand, InvalidRequest, JointSample
+from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidRequest, JointSample
 from flat_planner_ros.core.monitor import PlannedMotion, Residual, select
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
@@ -32,8 +32,6 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory
-
-FloatArray = NDArray[np.float64]
 
 Message = TypeVar('Message')
 

@@ -23,11 +23,9 @@ form is left to the middleware.
 from struct import Struct, unpack_from
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 FIELDS = ('positions', 'velocities', 'accelerations', 'effort')
 """Arrays of a point in the order of the message."""

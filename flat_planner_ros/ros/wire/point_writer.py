@@ -25,10 +25,8 @@ from collections.abc import Sequence
 import struct
 import sys
 
+from flat_planner_ros.core.arm import FloatArray
 import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
 
 ARRAYS = 4
 """Positions, velocities, accelerations and efforts of a point."""
