@@ -31,7 +31,7 @@ from flat_planner_ros.core import (
     PlanarArm,
     PlanningOptions,
     predict_residual,
-    predicted_residual,
+    residual_of_plan,
     Strategy,
     UncertaintyBox,
 )
@@ -68,7 +68,7 @@ for motion in (least, insensitive):
         predict_residual(arm.scaled(stiffness=factor), torque, motion.duration, nothing).nominal
         for factor in factors
     ]
-    worst[name] = predicted_residual(motion).worst
+    worst[name] = residual_of_plan(motion).worst
     axis.plot(factors, left, label=f'{name}, {1e3 * motion.rms_effort[0]:.1f} mN m')
     print(f'{name:20} RMS {1e3 * motion.rms_effort[0]:.2f} mN m, worst {worst[name]:.1e} rad')
 

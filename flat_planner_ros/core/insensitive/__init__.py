@@ -14,7 +14,11 @@
 
 """Insensitivity: the residual on arms other than the model, and laws that keep it small."""
 
-from flat_planner_ros.core.insensitive.law import least_effort, rehearse, shaped_motion
+from flat_planner_ros.core.insensitive.law import (
+    check_insensitivity,
+    insensitive_motion,
+    least_effort,
+)
 from flat_planner_ros.core.insensitive.residual import (
     MAX_HALF_WIDTH,
     predict_residual,
@@ -40,8 +44,8 @@ __all__ = [
     'Nominal',
     'predict_residual',
     'PredictedResidual',
-    'rehearse',
-    'shaped_motion',
+    'check_insensitivity',
+    'insensitive_motion',
     'shaped_quintic',
     'Shaper',
     'UncertaintyBox',

@@ -100,7 +100,7 @@ MOTIONS_KEPT = 64
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ShapedMotion:
+class InsensitiveMotion:
     """
     An insensitive motion over 1 rad.
 
@@ -137,9 +137,9 @@ def least_effort(arm: PlanarArm, distance: float, duration: float) -> float:
     return sqrt(12.0) * arm.inertia_star.both * abs(distance) / duration**2
 
 
-def shaped_motion(
+def insensitive_motion(
     arm: PlanarArm, duration: float, wanted: Insensitivity, distance: float
-) -> ShapedMotion:
+) -> InsensitiveMotion:
     """
     Return the insensitive motion over 1 rad, for use over a distance.
 
@@ -168,7 +168,7 @@ def shaped_motion(
     return _solved(arm, duration, wanted, abs(distance) if is_bounded else 1.0)
 
 
-def rehearse(arm: PlanarArm, wanted: Insensitivity) -> None:
+def check_insensitivity(arm: PlanarArm, wanted: Insensitivity) -> None:
     """
     Solve a problem of this kind, so that it is known to have a solution and libraries are loaded.
 
@@ -189,7 +189,7 @@ def rehearse(arm: PlanarArm, wanted: Insensitivity) -> None:
 @lru_cache(maxsize=MOTIONS_KEPT)
 def _solved(
     arm: PlanarArm, duration: float, wanted: Insensitivity, distance: float
-) -> ShapedMotion:
+) -> InsensitiveMotion:
     """Return the motion; arms count as equal if identical."""
     problem = _Problem.of(arm, duration, wanted)
     if wanted.max_residual > 0.0:
@@ -365,7 +365,7 @@ class _Problem:
         """Tell whether the largest residual is weighed."""
         return self.wanted.criterion is Criterion.WORST
 
-    def motion(self, found: _Compromise) -> ShapedMotion:
+    def motion(self, found: _Compromise) -> InsensitiveMotion:
         """Return the law of a solution, with its certificate."""
         basis, coefficients = self.basis, self.origin + self.directions @ found.c
         torque = basis.torque_start + basis.torque_directions @ coefficients
@@ -373,7 +373,7 @@ class _Problem:
         mapping = flat_map(self.arm, FlatModel.EXACT)
         law = answer(fourth, torque, mapping, self.duration)
         is_exact = self.wanted.nominal is Nominal.EXACT
-        return ShapedMotion(
+        return InsensitiveMotion(
             law=law,
             weight=found.weight,
             effort=found.effort,

@@ -32,9 +32,9 @@ from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration,
 from flat_planner_ros.core.planning.stopping import stop_plan
 from flat_planner_ros.core.planning.timing import OnViolation, TimedPlan, Timing
 from flat_planner_ros.core.planning.tradeoff import (
-    advice,
     baselines,
-    predicted_residual,
+    duration_advice,
+    residual_of_plan,
     tradeoff_points,
     TradeoffPoint,
 )
@@ -43,7 +43,7 @@ from flat_planner_ros.core.planning.via_times import with_via_times
 __all__ = [
     'CONDITIONS',
     'Strategy',
-    'advice',
+    'duration_advice',
     'baselines',
     'Extrema',
     'extrema_of',
@@ -58,7 +58,7 @@ __all__ = [
     'planned_at_rest',
     'PlanningOptions',
     'PlanSamples',
-    'predicted_residual',
+    'residual_of_plan',
     'Quantity',
     'Reason',
     'RequestRejected',

@@ -16,7 +16,7 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.insensitive import Insensitivity, shaped_motion
+from flat_planner_ros.core.insensitive import insensitive_motion, Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, MotionLaw
 from flat_planner_ros.core.planning.course import FreeCourse, Law
 from flat_planner_ros.core.planning.task import Task
@@ -58,7 +58,7 @@ def shaped_course(
 
     """
     distance = final[0] - start[0]
-    shaped = shaped_motion(task.arm, task.duration, wanted, distance)
+    shaped = insensitive_motion(task.arm, task.duration, wanted, distance)
     laws: list[Law] = [shaped.law.over(distance, 0.5 * (start[0] + final[0]))]
     for begin, end in zip(start[1:], final[1:], strict=True):
         laws.append(

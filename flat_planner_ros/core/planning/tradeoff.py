@@ -95,7 +95,7 @@ class TradeoffPoint:
     worst: float
 
 
-def predicted_residual(planned: Plan, samples: PlanSamples | None = None) -> PredictedResidual:
+def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> PredictedResidual:
     """
     Return what a plan leaves behind, as it is played with linear interpolation.
 
@@ -126,7 +126,7 @@ def predicted_residual(planned: Plan, samples: PlanSamples | None = None) -> Pre
     )
 
 
-def advice(planned: Plan, residual: PredictedResidual) -> str | None:
+def duration_advice(planned: Plan, residual: PredictedResidual) -> str | None:
     """
     Return a line on what a little more time would do, None where it does not pay.
 
@@ -149,7 +149,7 @@ def advice(planned: Plan, residual: PredictedResidual) -> str | None:
             longer = plan(replace(request, duration=duration), planned.task.arm, planned.options)
         except FlatPlannerError:
             return line
-        left = predicted_residual(longer, longer.sample(duration / ADVICE_INTERVALS))
+        left = residual_of_plan(longer, longer.sample(duration / ADVICE_INTERVALS))
         if left.worst > PAYS * residual.worst:
             return line
         line = (
@@ -267,7 +267,7 @@ def _sweep(
 def _point(series: str, planned: Plan, weight: float = 0.0) -> TradeoffPoint:
     """Return a plan as a point."""
     samples = planned.sample(planned.duration / INTERVALS)
-    residual = predicted_residual(planned, samples)
+    residual = residual_of_plan(planned, samples)
     return TradeoffPoint(
         series=series,
         duration=planned.duration,

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from math import isqrt
 
 from flat_planner_ros.core.arm import flat_map, FlatModel
-from flat_planner_ros.core.insensitive import rehearse
+from flat_planner_ros.core.insensitive import check_insensitivity
 from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.planning import JointLimits, OnViolation, PlanningOptions
 from flat_planner_ros.core.session import SessionSettings, StartSource
@@ -279,7 +279,7 @@ def build(values: Values) -> PlannerSettings:
     if options.strategy is Strategy.INSENSITIVE:
         if options.flat_model is not FlatModel.EXACT:
             raise InvalidParameter('strategy insensitive needs flat_model: exact')
-        rehearse(arm, options.insensitivity)
+        check_insensitivity(arm, options.insensitivity)
     # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
     strategy_cost(
         options.strategy,

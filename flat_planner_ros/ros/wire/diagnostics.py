@@ -26,7 +26,12 @@ from flat_planner_ros.core.monitor import (
     StiffnessEstimate,
     VibrationReport,
 )
-from flat_planner_ros.core.planning import advice, baselines, predicted_residual, RequestRejected
+from flat_planner_ros.core.planning import (
+    baselines,
+    duration_advice,
+    RequestRejected,
+    residual_of_plan,
+)
 from flat_planner_ros.core.session import Ended, Goal, Motion, Outcome
 from flat_planner_ros.ros.wire.conversions import time_msg
 from flat_planner_ros.ros.wire.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
@@ -300,7 +305,7 @@ def _of_estimate(estimate: StiffnessEstimate | None) -> Values:
 def _of_residual(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:
     """Return what a motion is predicted to leave behind, and what others would."""
     try:
-        residual = predicted_residual(motion.plan, motion.samples)
+        residual = residual_of_plan(motion.plan, motion.samples)
     except InvalidRequest:
         return {}  # an arm that does not oscillate leaves nothing to predict
     box = residual.box
@@ -309,7 +314,7 @@ def _of_residual(motion: Motion, *, with_advice: bool, with_baselines: bool) -> 
         'predicted_residual_worst': residual.worst,
         'predicted_residual_box': f'stiffness +-{100.0 * box.stiffness:g} %, '
         f'damping +-{100.0 * box.damping:g} %',
-        'advice': advice(motion.plan, residual) if with_advice else None,
+        'advice': duration_advice(motion.plan, residual) if with_advice else None,
     }
     if with_baselines:
         for point in baselines(motion.plan):

@@ -20,7 +20,7 @@ from flat_planner_ros.core.insensitive.settings import Insensitivity, Nominal
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
-from flat_planner_ros.core.planning.tradeoff import predicted_residual
+from flat_planner_ros.core.planning.tradeoff import residual_of_plan
 import numpy as np
 import pytest
 
@@ -90,5 +90,5 @@ def test_mujoco_s_arm_swings_as_predicted(nominal, factors):
     poles = oscillator.poles(np.array([factors]))
     (predicted,) = residual_amplitude(oscillator, samples.torque, 1.0, poles)
     assert amplitude == pytest.approx(predicted, rel=2e-3, abs=1e-6)
-    assert amplitude <= predicted_residual(result, samples).worst * 1.002 <= 0.0121
+    assert amplitude <= residual_of_plan(result, samples).worst * 1.002 <= 0.0121
     assert abs(angles.sum() - np.pi) < 0.02

@@ -26,9 +26,9 @@ from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.planning.tradeoff import (
-    advice,
     baselines,
-    predicted_residual,
+    duration_advice,
+    residual_of_plan,
     tradeoff_points,
 )
 import numpy as np
@@ -44,7 +44,7 @@ def advised(duration=1.0, **options):
     """Return the advice on a motion from 0 to pi."""
     request = MotionRequest(start=np.zeros(2), final=np.array([np.pi, 0.0]), duration=duration)
     result = plan(request, ARM, PlanningOptions(**options))
-    return advice(result, predicted_residual(result))
+    return duration_advice(result, residual_of_plan(result))
 
 
 @pytest.mark.parametrize('shaper', Shaper)
@@ -112,7 +112,7 @@ def test_the_paper_s_residuals_are_predicted():
     }
     for strategy, (nominal, worst) in expected.items():
         options = PlanningOptions(strategy=strategy, flat_model=FlatModel.APPROXIMATE)
-        residual = predicted_residual(plan(REQUEST, ARM, options))
+        residual = residual_of_plan(plan(REQUEST, ARM, options))
         assert residual.nominal == pytest.approx(nominal, abs=1e-5)
         assert residual.worst == pytest.approx(worst, abs=6e-4)
 
@@ -135,7 +135,7 @@ def test_advice_keeps_its_promise():
     assert line == '20 % longer (1.2 s) cuts the worst residual from 0.084 to 0.02 rad'
     longer = MotionRequest(start=np.zeros(2), final=np.array([np.pi, 0.0]), duration=1.2)
     options = PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY)
-    assert predicted_residual(plan(longer, ARM, options)).worst == pytest.approx(0.02, abs=5e-4)
+    assert residual_of_plan(plan(longer, ARM, options)).worst == pytest.approx(0.02, abs=5e-4)
 
 
 def test_no_advice_from_the_midst_of_a_motion():
@@ -145,8 +145,8 @@ def test_no_advice_from_the_midst_of_a_motion():
         start=np.zeros(2), final=np.array([np.pi, 0.0]), duration=1.0, start_jets=jets
     )
     result = plan(request, ARM, PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY))
-    residual = predicted_residual(result)
-    assert advice(result, residual) is None
+    residual = residual_of_plan(result)
+    assert duration_advice(result, residual) is None
     assert baselines(result) == ()
     # Nothing is left on the nominal arm: the swing at the start is taken into account.
     assert residual.nominal < 1e-6 < residual.worst

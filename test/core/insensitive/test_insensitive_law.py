@@ -20,7 +20,7 @@ from core.conftest import ARM, ELBOW, envelope
 from flat_planner_ros.core.arm.errors import InvalidRequest, OutOfReach
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
-from flat_planner_ros.core.insensitive.law import least_effort, shaped_motion
+from flat_planner_ros.core.insensitive.law import insensitive_motion, least_effort
 from flat_planner_ros.core.insensitive.residual import (
     Oscillator,
     predict_residual,
@@ -364,7 +364,7 @@ def test_one_way_to_choose():
 
 def test_a_weight_serves_every_distance():
     wanted = Insensitivity(weight=70.0)
-    assert shaped_motion(ARM, 1.0, wanted, 0.1) is shaped_motion(ARM, 1.0, wanted, -2.0)
+    assert insensitive_motion(ARM, 1.0, wanted, 0.1) is insensitive_motion(ARM, 1.0, wanted, -2.0)
 
 
 def test_a_small_worst_case_by_default():
