@@ -30,7 +30,7 @@ from sensor_msgs.msg import JointState
 
 aiohttp = pytest.importorskip('aiohttp')
 
-from flat_planner_ros.ros import live_view as live  # noqa: E402, I100  They need what is asked for above.
+from flat_planner_ros.ros import live_view as live  # noqa: E402, I100  They need it.
 from flat_planner_ros.ros.live_view import live_node  # noqa: E402
 from flat_planner_ros.ros.live_view.server import MAX_BROWSERS, RATE  # noqa: E402
 

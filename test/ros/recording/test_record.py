@@ -41,7 +41,7 @@ pytest.importorskip('mcap')
 rosbag2 = pytest.importorskip('rosbags.rosbag2')
 highlevel = pytest.importorskip('rosbags.highlevel')
 
-from flat_planner_ros.ros.programs import analyse  # noqa: E402, I100  They need what is asked for above.
+from flat_planner_ros.ros.programs import analyse  # noqa: E402, I100  They need it.
 from flat_planner_ros.ros.recording.recorder_node import RecorderNode  # noqa: E402
 from flat_planner_ros.ros.recording.recording import Recording, UnreadableRecording  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
