@@ -78,6 +78,7 @@ class VibrationMonitor:
         self._last: JointSample | None = None
         self._dropped = self._told = 0
         self._set_back = 0.0
+        self._reports: list[VibrationReport] = []
         self._positions = self._efforts = Record(0)
 
     @property
@@ -108,7 +109,7 @@ class VibrationMonitor:
         self._told, self._set_back = self._dropped, 0.0
         return troubles
 
-    def plan(self, motion: PlannedMotion) -> VibrationReport | None:
+    def plan(self, motion: PlannedMotion) -> list[VibrationReport]:
         """
         Take a planned motion, to be watched from its start.
 
@@ -119,17 +120,18 @@ class VibrationMonitor:
 
         Returns
         -------
-        VibrationReport or None
+        list of VibrationReport
             Report on the former motion, if the new one has started and thereby cuts it short.
 
         """
         known = (self._pending, self._motion)
         if any(other is not None and other.is_same(motion) for other in known):
-            return None
+            return []
         self._pending = motion
-        return self._start_pending(self._now)
+        self._start_pending(self._now)
+        return self._take_reports()
 
-    def add(self, sample: JointSample) -> VibrationReport | None:
+    def add(self, sample: JointSample) -> list[VibrationReport]:
         """
         Take a sample; late, repeated and undefined ones are dropped and counted.
 
@@ -140,13 +142,13 @@ class VibrationMonitor:
 
         Returns
         -------
-        VibrationReport or None
-            Report on the motion that this sample ends or cuts short.
+        list of VibrationReport
+            Reports on the motions that this sample ends or cuts short, in order.
 
         Raises
         ------
         InvalidRequest
-            If the number of joints is not the motion's.
+            If the number of joints is not the motion's. No report is lost: the next call has it.
 
         """
         time, positions = sample.time, sample.positions
@@ -155,29 +157,30 @@ class VibrationMonitor:
         # The sum of squares is finite only if all positions are.
         if not (time > self._last_sample and isfinite(time + float(positions.dot(positions)))):
             self._dropped += 1
-            return None
-        report = self._advance(time)
+            return []
+        self._advance(time)
         former, self._last = self._last, sample
         self._last_sample = self._heard = time
         motion = self._motion
         if motion is None or self._state is Phase.DONE:
-            return report
+            return self._take_reports()
         _check_size(sample, motion)
         # Between two motions an arm may be put elsewhere, and nobody minds.
         since = max(motion.start, time - self.settings.timeout)
         if former is not None and former.time >= since:
             jump = _jump(former, sample, motion)
             if jump:
-                return self._close(time, jump)
+                self._close(time, jump)
+                return self._take_reports()
         if time <= motion.end:
             self._efforts.append(time, nan if sample.efforts is None else sample.efforts)
         if time >= motion.end:
             self._positions.append(time, positions)
         if time >= motion.end + self.settings.window:
-            return self._close(time)
-        return report
+            self._close(time)
+        return self._take_reports()
 
-    def tick(self, now: float) -> VibrationReport | None:
+    def tick(self, now: float) -> list[VibrationReport]:
         """
         Take the time, so that silence is noticed.
 
@@ -188,13 +191,14 @@ class VibrationMonitor:
 
         Returns
         -------
-        VibrationReport or None
+        list of VibrationReport
             Stale report on a motion whose samples stopped, or report on one cut short.
 
         """
         if now < self._now - self.settings.timeout:
             self._reset_by(self._now - now)
-        return self._advance(now)
+        self._advance(now)
+        return self._take_reports()
 
     def residual(self, sample: JointSample) -> Residual | None:
         """
@@ -225,16 +229,20 @@ class VibrationMonitor:
             None if sample.velocities is None else sample.velocities - velocity,
         )
 
-    def _advance(self, now: float) -> VibrationReport | None:
+    def _take_reports(self) -> list[VibrationReport]:
+        """Return the reports made since this was last asked."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    def _advance(self, now: float) -> None:
         """Let time reach now: notice silence, the motion's end, the next motion's start."""
         self._now = max(self._now, now)
-        report = None
         silence = now - self._heard
         if self._is_watching() and silence > self.settings.timeout:
-            report = self._close(now, f'no samples for {silence:.3g} s', stale=True)
+            self._close(now, f'no samples for {silence:.3g} s', stale=True)
         if self._state is Phase.MOVING and self._motion is not None and now >= self._motion.end:
             self._state = Phase.SETTLING
-        return self._start_pending(self._now) or report
+        self._start_pending(self._now)
 
     def _reset_by(self, step: float) -> None:
         """Start again after a step back in time [s]."""
@@ -245,18 +253,18 @@ class VibrationMonitor:
         """Return whether a motion has started and has no report yet."""
         return self._state in (Phase.MOVING, Phase.SETTLING)
 
-    def _start_pending(self, now: float) -> VibrationReport | None:
+    def _start_pending(self, now: float) -> None:
         """Start the waiting motion if it is time, and report on a former still settling."""
-        motion, former, report = self._pending, self._motion, None
+        motion, former = self._pending, self._motion
         if motion is None or now < motion.start:
-            return None
+            return
         is_spliced = False
         if former is not None and self._is_watching():
             is_spliced = motion.start <= former.end
             if not is_spliced:
                 is_cut = motion.start < former.end + self.settings.window
                 cause = 'window cut short by the next motion' if is_cut else ''
-                report = self._close(motion.start, cause)
+                self._close(motion.start, cause)
         # A motion spliced into a running one starts with what that one has measured.
         if not (is_spliced and former and former.joint_names == motion.joint_names):
             self._efforts = Record(len(motion.joint_names))
@@ -267,18 +275,14 @@ class VibrationMonitor:
         else:
             is_past = now > motion.end + self.settings.window
             self._state = Phase.DONE if is_past else Phase.SETTLING
-        return report
 
-    def _close(
-        self, until: float, cause: str = '', *, stale: bool = False
-    ) -> VibrationReport | None:
+    def _close(self, until: float, cause: str = '', *, stale: bool = False) -> None:
         """End the watch of the present motion and judge it on the samples before `until`."""
         self._state = Phase.DONE
-        if self._motion is None:
-            return None
-        return assess(
-            self._motion, self.settings, self._positions, self._efforts, until, cause, stale=stale
-        )
+        if self._motion is not None:
+            measured = self._positions, self._efforts
+            report = assess(self._motion, self.settings, *measured, until, cause, stale=stale)
+            self._reports.append(report)
 
 
 def _check_size(sample: JointSample, motion: PlannedMotion) -> None:

@@ -128,7 +128,7 @@ class MonitorNode(Node):
             self._forget()
             self._reader = conversions.JointStateReader(motion.joint_names)
         self._plan = motion
-        self._publish_report(self._monitor.plan(motion))
+        self._publish_reports(self._monitor.plan(motion))
 
     def _on_measured(self, msg: JointState) -> None:
         """Take a sample and tell how far it is from the plan."""
@@ -138,7 +138,7 @@ class MonitorNode(Node):
             msg.header.stamp = self.get_clock().now().to_msg()
         try:
             sample = self._reader.read(msg)
-            report = self._monitor.add(sample)
+            reports = self._monitor.add(sample)
         except FlatPlannerError as error:
             self._watch.heard_other_part()
             self.get_logger().warning(
@@ -152,7 +152,7 @@ class MonitorNode(Node):
                 self._residual.publish(
                     conversions.residual_msg(msg.header, self._reader.joints, residual)
                 )
-        self._publish_report(report)
+        self._publish_reports(reports)
 
     def _on_status(self, msg: DiagnosticArray) -> None:
         """Expect what the planner expects, once it has adopted other values than its file's."""
@@ -175,7 +175,7 @@ class MonitorNode(Node):
         # The node's own time would end the watch of a plan that is of another clock.
         is_known = self._stamps.stamp is not None
         if plan is not None and (is_known or abs(now - plan.start) < SAME_CLOCK):
-            self._publish_report(self._monitor.tick(now))
+            self._publish_reports(self._monitor.tick(now))
 
     def _on_diagnostics(self) -> None:
         """Publish the present state, and say what was wrong since the last time."""
@@ -192,18 +192,17 @@ class MonitorNode(Node):
         response.message = 'waiting for the next plan'
         return response
 
-    def _publish_report(self, report: VibrationReport | None) -> None:
-        """Publish and log a report, if there is one."""
-        if report is None:
-            return
-        self._report = report
-        status = diagnostics.report_status(report)
-        self._reports.publish(diagnostics.array_of(status, self._stamps.now(self._now())))
-        # One call for both would not do: a place in the code may log at one severity only.
-        if status.level == DiagnosticStatus.OK:
-            self.get_logger().info(status.message)
-        else:
-            self.get_logger().warning(status.message)
+    def _publish_reports(self, reports: Sequence[VibrationReport]) -> None:
+        """Publish and log reports, each in a message of its own."""
+        for report in reports:
+            self._report = report
+            status = diagnostics.report_status(report)
+            self._reports.publish(diagnostics.array_of(status, self._stamps.now(self._now())))
+            # One call for both would not do: a place in the code may log at one severity only.
+            if status.level == DiagnosticStatus.OK:
+                self.get_logger().info(status.message)
+            else:
+                self.get_logger().warning(status.message)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -197,26 +197,27 @@ class _Player:
         self._samples.append(sample)
         self._keep(self.monitor.add(sample))
 
-    def _keep(self, report: VibrationReport | None) -> None:
-        """Keep a report with its motion and samples."""
-        if report is None:
-            return
-        motion = next(m for m in reversed(self._motions) if m.start == report.start_time)
+    def _keep(self, reports: Sequence[VibrationReport]) -> None:
+        """Keep reports, each with its motion and samples."""
+        for report in reports:
+            motion = next(m for m in reversed(self._motions) if m.start == report.start_time)
+            self.judgements.append(self._judgement(report, motion))
+            # The next motion needs what came since this one began, at most.
+            self._samples = [sample for sample in self._samples if sample.time >= motion.start]
+
+    def _judgement(self, report: VibrationReport, motion: PlannedMotion) -> Judgement:
+        """Return a report with its motion and the samples around it."""
         first = motion.start - SHOWN_BEFORE * (motion.end - motion.start)
         last = motion.end + self.monitor.settings.window
         shown = [sample for sample in self._samples if first <= sample.time <= last]
         unknown = np.full(len(motion.joint_names), np.nan)
-        self.judgements.append(
-            Judgement(
-                report=report,
-                motion=motion,
-                times=np.array([sample.time for sample in shown]),
-                positions=np.array([sample.positions for sample in shown]),
-                efforts=np.array([unknown if s.efforts is None else s.efforts for s in shown]),
-            )
+        return Judgement(
+            report=report,
+            motion=motion,
+            times=np.array([sample.time for sample in shown]),
+            positions=np.array([sample.positions for sample in shown]),
+            efforts=np.array([unknown if s.efforts is None else s.efforts for s in shown]),
         )
-        # The next motion needs what came since this one began, at most.
-        self._samples = [sample for sample in self._samples if sample.time >= motion.start]
 
 
 def _find(

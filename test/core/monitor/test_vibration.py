@@ -79,7 +79,7 @@ def feed(monitor, motion, start, end, amplitude=0.02, **changes):
     """Add samples of [start, end) and return the reports."""
     steps = range(round(start / PERIOD), round(end / PERIOD))
     reports = [monitor.add(sample(i * PERIOD, motion, amplitude, **changes)) for i in steps]
-    return [report for report in reports if report is not None]
+    return sum(reports, [])
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def only(reports):
 
 def test_a_motion_yields_one_report_with_what_was_simulated(monitor):
     motion = planned()
-    assert monitor.plan(motion) is None
+    assert monitor.plan(motion) == []
     report = only(feed(monitor, motion, 9.0, 15.0))
     assert report.level is Level.WARN
     assert report.joint == 'joint2'
@@ -192,8 +192,8 @@ def test_final_error_is_the_mean_over_the_last_whole_period(monitor):
     for i in range(round(9.9 / PERIOD), round(13.1 / PERIOD)):
         now = sample(i * PERIOD, motion, 0.02)
         moved = JointSample(time=now.time, positions=now.positions + offset)
-        reports.append(monitor.add(moved))
-    report = only([report for report in reports if report])
+        reports += monitor.add(moved)
+    report = only(reports)
     assert report.final_error[0] == pytest.approx(0.013, abs=1e-12)
     # A decaying swing leaves a mean of the order of its loss per period.
     assert report.final_error[1] == pytest.approx(-0.004, abs=5e-4)
@@ -216,10 +216,10 @@ def test_a_plan_received_again_does_not_restart(monitor):
     motion = planned()
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 10.5)
-    assert monitor.plan(planned()) is None
+    assert monitor.plan(planned()) == []
     assert monitor.motion is motion
     only(feed(monitor, motion, 10.5, 13.1))
-    assert monitor.plan(planned()) is None
+    assert monitor.plan(planned()) == []
     assert feed(monitor, motion, 13.1, 16.0) == []
     assert monitor.state is Phase.DONE
     # A different one does restart.
@@ -240,14 +240,14 @@ def test_a_waiting_plan_received_again_still_waits_and_a_new_one_replaces_it(mon
 def test_a_plan_long_past_gives_no_report(monitor):
     motion = planned()
     feed(monitor, motion, 20.0, 20.1)
-    assert monitor.plan(motion) is None
+    assert monitor.plan(motion) == []
     assert monitor.state is Phase.DONE
     assert feed(monitor, motion, 20.1, 25.0) == []
-    assert monitor.tick(30.0) is None
+    assert monitor.tick(30.0) == []
     fresh = VibrationMonitor(SETTINGS)
     fresh.plan(motion)
-    assert fresh.tick(20.0) is None
-    assert fresh.tick(30.0) is None
+    assert fresh.tick(20.0) == []
+    assert fresh.tick(30.0) == []
     assert fresh.state is Phase.DONE
 
 
@@ -275,7 +275,7 @@ def test_a_new_motion_cuts_the_window_short(monitor):
     motion = planned()
     monitor.plan(motion)
     assert feed(monitor, motion, 9.9, 12.5) == []
-    report = monitor.plan(planned(start=12.45, goal=2.0))
+    report = only(monitor.plan(planned(start=12.45, goal=2.0)))
     assert report.amplitude == pytest.approx(0.02, rel=1e-6)
     assert report.window == pytest.approx(1.45, abs=1.01 * PERIOD)
     assert 'cut short' in report.message
@@ -289,10 +289,10 @@ def test_a_future_motion_leaves_the_former_to_settle_until_its_start(monitor):
     former, following = planned(), planned(start=12.5, goal=2.0)
     monitor.plan(former)
     feed(monitor, former, 9.9, 11.5)
-    assert monitor.plan(following) is None
+    assert monitor.plan(following) == []
     assert feed(monitor, former, 11.5, 12.5) == []
     assert monitor.state is Phase.SETTLING
-    report = monitor.add(sample(12.5, following))
+    report = only(monitor.add(sample(12.5, following)))
     assert report.start_time == 10.0
     assert report.window == pytest.approx(1.5 - PERIOD)
     assert 'cut short' in report.message
@@ -316,9 +316,34 @@ def test_a_motion_after_the_window_is_not_said_to_cut_it(monitor):
     feed(monitor, former, 9.9, 12.9)
     monitor.plan(following)
     # The sample that would have closed the window is missing.
-    report = monitor.add(sample(13.2, following))
+    report = only(monitor.add(sample(13.2, following)))
     assert report.start_time == 10.0
     assert 'cut short' not in report.message
+
+
+def test_a_sample_that_cuts_one_motion_and_ends_the_next_gives_both_reports():
+    # The sample is exactly at the end of the following window, 2.1875 s; none came before.
+    monitor = VibrationMonitor(replace(SETTINGS, window=0.25, timeout=1.0))
+    former, following = planned(start=1.0, duration=0.5), planned(start=1.6875, duration=0.25)
+    monitor.plan(former)
+    assert feed(monitor, former, 0.9, 1.6) == []
+    monitor.plan(following)
+    reports = monitor.add(sample(following.end + 0.25, following))
+    assert [report.start_time for report in reports] == [1.0, 1.6875]
+    assert 'cut short' in reports[0].message
+    assert [report.samples for report in reports] == [20, 1]
+    assert feed(monitor, following, 2.2, 3.0) == []
+
+
+def test_a_refused_sample_takes_no_report_along(monitor):
+    former = planned()
+    monitor.plan(former)
+    feed(monitor, former, 9.9, 11.5)
+    other = {'joint_names': ('a', 'b', 'c'), 'positions': np.zeros((51, 3)), 'velocities': None}
+    monitor.plan(planned(start=11.6, **other))
+    with pytest.raises(InvalidRequest, match='shape'):
+        monitor.add(sample(11.7, former))
+    assert only(monitor.tick(11.8)).start_time == 10.0
 
 
 def test_a_motion_spliced_into_a_running_one_keeps_its_samples(monitor):
@@ -326,7 +351,7 @@ def test_a_motion_spliced_into_a_running_one_keeps_its_samples(monitor):
     spliced = planned(duration=1.5, goal=2.0)
     monitor.plan(former)
     feed(monitor, former, 9.9, 10.6)
-    assert monitor.plan(spliced) is None
+    assert monitor.plan(spliced) == []
     report = only(feed(monitor, spliced, 10.6, 14.0))
     assert report.end_time == 11.5
     expected = np.sin(2 * np.pi * np.linspace(0.0, 1.5, 3001)) ** 2
@@ -337,14 +362,14 @@ def test_silence_is_reported_once(monitor):
     motion = planned()
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 10.5)
-    assert monitor.tick(10.9) is None
-    report = monitor.tick(11.1)
+    assert monitor.tick(10.9) == []
+    report = only(monitor.tick(11.1))
     assert report.level is Level.STALE
     assert 'no samples for' in report.message
     assert report.samples == 0
     assert report.amplitude is None
     assert report.final_error == ()
-    assert monitor.tick(12.0) is None
+    assert monitor.tick(12.0) == []
     assert feed(monitor, motion, 12.0, 14.0) == []
 
 
@@ -352,7 +377,7 @@ def test_silence_while_settling_keeps_what_was_seen(monitor):
     motion = planned()
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 12.5)
-    report = monitor.tick(13.2)
+    report = only(monitor.tick(13.2))
     assert report.level is Level.STALE
     assert report.amplitude == pytest.approx(0.02, rel=1e-6)
 
@@ -361,24 +386,24 @@ def test_silence_is_noticed_without_ticks(monitor):
     motion = planned()
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 11.2)
-    assert monitor.add(sample(12.9, motion)).level is Level.STALE
+    assert only(monitor.add(sample(12.9, motion))).level is Level.STALE
 
 
 def test_no_sample_at_all_is_silence_from_the_start_on(monitor):
     monitor.plan(planned())
-    assert monitor.tick(9.0) is None
-    assert monitor.tick(10.0) is None
-    assert monitor.tick(10.4) is None
-    assert monitor.tick(10.6).level is Level.STALE
+    assert monitor.tick(9.0) == []
+    assert monitor.tick(10.0) == []
+    assert monitor.tick(10.4) == []
+    assert only(monitor.tick(10.6)).level is Level.STALE
 
 
 def test_silence_before_and_after_a_motion_is_nothing_to_report(monitor):
     motion = planned()
     monitor.plan(motion)
-    assert monitor.tick(1.0) is None
-    assert monitor.tick(9.0) is None
+    assert monitor.tick(1.0) == []
+    assert monitor.tick(9.0) == []
     only(feed(monitor, motion, 9.0, 13.1))
-    assert monitor.tick(100.0) is None
+    assert monitor.tick(100.0) == []
 
 
 def test_useless_samples_are_dropped_and_change_nothing(monitor):
@@ -389,7 +414,7 @@ def test_useless_samples_are_dropped_and_change_nothing(monitor):
     reports = []
     for i in range(round(9.9 / PERIOD), round(13.1 / PERIOD)):
         time = i * PERIOD
-        reports += [monitor.add(sample(time, motion)), clean.add(sample(time, motion))]
+        reports += monitor.add(sample(time, motion)) + clean.add(sample(time, motion))
         for useless in (
             sample(time, motion, 0.7),
             sample(time - 10 * PERIOD, motion, 0.7),
@@ -398,8 +423,8 @@ def test_useless_samples_are_dropped_and_change_nothing(monitor):
             JointSample(time=np.nan, positions=np.zeros(2)),
             JointSample(time=np.inf, positions=np.zeros(2)),
         ):
-            assert monitor.add(useless) is None
-    disturbed, undisturbed = (report for report in reports if report)
+            assert monitor.add(useless) == []
+    disturbed, undisturbed = reports
     assert disturbed.fit == undisturbed.fit
     assert clean.dropped == 0
     assert monitor.dropped == 6 * round(3.2 / PERIOD)
@@ -410,7 +435,7 @@ def test_undefined_positions_count_as_silence(monitor):
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 10.5)
     assert feed(monitor, motion, 10.5, 12.0, positions=np.full(2, np.nan)) == []
-    assert monitor.tick(12.0).level is Level.STALE
+    assert only(monitor.tick(12.0)).level is Level.STALE
 
 
 def test_missing_samples_do_not_disturb(monitor):
@@ -418,7 +443,7 @@ def test_missing_samples_do_not_disturb(monitor):
     monitor.plan(motion)
     rng = np.random.default_rng(6)
     times = 9.9 + np.cumsum(rng.uniform(0.2, 4.0, 400) * PERIOD)
-    report = only([r for r in (monitor.add(sample(t, motion)) for t in times) if r])
+    report = only([report for t in times for report in monitor.add(sample(t, motion))])
     assert report.amplitude == pytest.approx(0.02, rel=1e-6)
     assert report.frequency == pytest.approx(FREQUENCY, rel=1e-6)
 
@@ -428,7 +453,7 @@ def test_a_clock_that_jumps_back_forgets_the_motion(monitor, by_tick):
     motion = planned()
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 11.5)
-    assert (monitor.tick(1.0) if by_tick else monitor.add(sample(1.0, motion))) is None
+    assert (monitor.tick(1.0) if by_tick else monitor.add(sample(1.0, motion))) == []
     assert monitor.state is Phase.IDLE
     assert monitor.motion is None
     again = planned(start=2.0)
@@ -498,7 +523,7 @@ def test_a_long_motion_at_a_high_rate_is_still_judged():
     motion = planned(duration=20.0)
     monitor.plan(motion)
     times = 9.5 + 0.001 * np.arange(23000)
-    report = only([r for r in (monitor.add(sample(t, motion)) for t in times) if r])
+    report = only([report for t in times for report in monitor.add(sample(t, motion))])
     assert report.amplitude == pytest.approx(0.02, rel=1e-6)
     assert report.rms_effort[0] == pytest.approx(np.sqrt(0.5), rel=1e-3)
 
@@ -586,7 +611,7 @@ def test_a_report_on_nothing_says_so_once(monitor):
     motion = planned()
     monitor.plan(motion)
     feed(monitor, motion, 9.9, 10.5)
-    message = monitor.tick(11.1).message
+    message = only(monitor.tick(11.1)).message
     assert message == 'amplitude unknown; no samples for 0.605 s'
 
 
@@ -595,7 +620,7 @@ def test_a_joint_that_jumps_ends_the_window_there(monitor):
     monitor.plan(motion)
     assert feed(monitor, motion, 9.9, 12.0) == []
     moved = sample(12.0, motion).positions - [0.5, 0.0]
-    report = monitor.add(sample(12.0, motion, positions=moved))
+    report = only(monitor.add(sample(12.0, motion, positions=moved)))
     assert 'joint1 jumped by -0.5 rad within 5 ms at 12.000 s' in report.message
     assert report.amplitude == pytest.approx(0.02, rel=1e-3)
     assert report.window < 1.0
@@ -610,7 +635,7 @@ def test_motion_is_no_jump_however_fast_and_rarely_seen(monitor, velocities, per
     times = np.arange(9.9, 10.3 + WINDOW + 0.4, period)
     changes = {} if velocities else {'velocities': None}
     reports = [monitor.add(sample(time, motion, **changes)) for time in times]
-    (report,) = [report for report in reports if report is not None]
+    report = only(sum(reports, []))
     assert 'jumped' not in report.message
 
 

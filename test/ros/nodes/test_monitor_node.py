@@ -641,7 +641,7 @@ def test_every_level_has_its_diagnostic_and_unknown_values_are_left_out():
     )
     monitor.plan(motion)
     monitor.add(JointSample(time=1.0, positions=np.zeros(2)))
-    report = monitor.tick(2.5)
+    (report,) = monitor.tick(2.5)
     for level in Level:
         status = diagnostics.report_status(replace(report, level=level))
         assert status.level == getattr(DiagnosticStatus, level.name)
