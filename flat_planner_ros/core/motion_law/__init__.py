@@ -22,13 +22,13 @@ from flat_planner_ros.core.motion_law.cost import (
     strategy_cost,
 )
 from flat_planner_ros.core.motion_law.extremal import (
+    BoundaryConditions,
+    costate,
     extremals,
-    Jets,
-    momentum_of,
     stationarity_residual,
 )
-from flat_planner_ros.core.motion_law.law import MAX_DERIVATIVE, MotionLaw
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, Path
+from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 from flat_planner_ros.core.motion_law.quadrature import motion_quadrature
 from flat_planner_ros.core.motion_law.unit_motion import (
     GRIDS_KEPT,
@@ -44,15 +44,15 @@ __all__ = [
     'extremals',
     'GRIDS_KEPT',
     'JET_ORDER',
-    'Jets',
+    'BoundaryConditions',
     'MAX_DERIVATIVE',
     'MAX_KEPT_INTERVALS',
     'MAX_WEIGHT',
-    'momentum_of',
+    'costate',
     'motion_quadrature',
-    'MotionLaw',
+    'ExponentialLaw',
     'optimal_path',
-    'Path',
+    'PathConditions',
     'probes',
     'QuadraticCost',
     'stationarity_residual',

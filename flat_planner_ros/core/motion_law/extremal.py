@@ -30,7 +30,7 @@ from itertools import pairwise
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, Block, block_of, CONDITIONS
-from flat_planner_ros.core.motion_law.law import MotionLaw
+from flat_planner_ros.core.motion_law.law import ExponentialLaw
 from flat_planner_ros.core.motion_law.modes import Mode
 from flat_planner_ros.core.motion_law.roots import Cluster, clusters
 import numpy as np
@@ -44,7 +44,7 @@ RESIDUAL_STEPS = 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Jets:
+class BoundaryConditions:
     """
     Value and five derivatives at both ends.
 
@@ -59,7 +59,9 @@ class Jets:
     end: FloatArray
 
 
-def extremal(coefficients: FloatArray, duration: float, jets: Jets) -> MotionLaw:
+def extremal(
+    coefficients: FloatArray, duration: float, jets: BoundaryConditions
+) -> ExponentialLaw:
     """
     Return the stationary motion law with given ends.
 
@@ -82,7 +84,9 @@ def extremal(coefficients: FloatArray, duration: float, jets: Jets) -> MotionLaw
     return extremals(coefficients, duration, [jets])[0]
 
 
-def extremals(coefficients: FloatArray, duration: float, jets: Sequence[Jets]) -> list[MotionLaw]:
+def extremals(
+    coefficients: FloatArray, duration: float, jets: Sequence[BoundaryConditions]
+) -> list[ExponentialLaw]:
     """Return the stationary laws of one equation for several pairs of ends, as `extremal`."""
     half = 0.5 * duration
     powers = half**_ORDERS
@@ -104,7 +108,7 @@ def extremals(coefficients: FloatArray, duration: float, jets: Sequence[Jets]) -
                 if parity not in solvers:
                     solvers[parity] = _BoundarySolver(found, parity)
                 modes.extend(solvers[parity].modes(target))
-        laws.append(MotionLaw(duration=duration, modes=tuple(modes)))
+        laws.append(ExponentialLaw(duration=duration, modes=tuple(modes)))
     return laws
 
 
@@ -124,11 +128,6 @@ def unit_modes(coefficients: FloatArray) -> tuple[Mode, ...]:
 
     """
     return tuple(_BoundarySolver(clusters(coefficients), -1.0).modes(_UNIT_END))
-
-
-def euler_lagrange_residual(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> float:
-    """Return how far a law is from stationary over some times, as `stationarity_residual`."""
-    return stationarity_residual(coefficients, law.jet(t, 2 * CONDITIONS))
 
 
 def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
@@ -154,21 +153,28 @@ def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
     return float(np.abs(weights @ even).max()) / size if size > 0.0 else 0.0
 
 
-def conserved_momentum(coefficients: FloatArray, law: MotionLaw, t: FloatArray) -> FloatArray:
-    """Return the conserved momentum of a law at some times, as `momentum_of`."""
-    return momentum_of(coefficients, law.jet(t, 2 * CONDITIONS - 1))
-
-
-def momentum_of(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
+def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
     """
-    Return the first integral -sum_k a_k y^(2k - 1) of the Euler-Lagrange equation.
+    Return half the costate of the value, -sum_k a_k y^(2k - 1), which an extremal conserves.
 
-    Constant along an extremal; times the distance it is the cost of a rest-to-rest motion
-    ((35) of docs/derivation.md), shape (m,).
+    Times the distance it is the cost of a rest-to-rest motion ((33) and (35) of
+    docs/derivation.md).
+
+    Parameters
+    ----------
+    coefficients
+        a_0 ... a_6, shape (7,).
+    jet
+        Derivatives 0 to 11 at some times, shape (12, m) or more rows.
+
+    Returns
+    -------
+    FloatArray
+        Its value at each of the times, shape (m,) [rad s^-11].
 
     """
-    momentum: FloatArray = -coefficients[1:] @ jet[1::2]
-    return momentum
+    value: FloatArray = -coefficients[1:] @ jet[1::2]
+    return value
 
 
 class _BoundarySolver:

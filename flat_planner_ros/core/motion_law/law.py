@@ -32,7 +32,7 @@ MAX_DERIVATIVE = 1e150
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MotionLaw:
+class ExponentialLaw:
     """
     A function of time on [0, duration], infinitely smooth.
 
@@ -106,6 +106,6 @@ class MotionLaw:
         """Return the modes, ready for evaluation in normalised time."""
         return mode_sum(self.modes)
 
-    def transformed(self, factor: float, offset: float) -> 'MotionLaw':
+    def transformed(self, factor: float, offset: float) -> 'ExponentialLaw':
         """Return offset + factor times this law."""
         return replace(self, factor=factor * self.factor, offset=offset + factor * self.offset)

@@ -16,7 +16,7 @@
 Optimal path: the motion law of least cost through given values at given times.
 
 Between via points it solves the Euler-Lagrange equation; at a via point everything is continuous
-but the momentum that belongs to the prescribed value (docs/derivation.md, section V).
+but the costate of the prescribed value (docs/derivation.md, section V).
 """
 
 from collections.abc import Sequence
@@ -28,8 +28,8 @@ from flat_planner_ros.core.arm import FloatArray, InvalidRequest, strict_arithme
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
 from flat_planner_ros.core.motion_law.coupling import coupling, Weights
-from flat_planner_ros.core.motion_law.extremal import momentum_of, stationarity_residual
-from flat_planner_ros.core.motion_law.law import MAX_DERIVATIVE, MotionLaw
+from flat_planner_ros.core.motion_law.extremal import costate, stationarity_residual
+from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE
 from flat_planner_ros.core.motion_law.piecewise_law import PiecewiseLaw
 from flat_planner_ros.core.motion_law.segment_basis import segment_basis, SegmentBasis, SOLUTIONS
 from flat_planner_ros.core.motion_law.unit_motion import rounded
@@ -43,7 +43,7 @@ MAX_DEPTH = 36
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Path:
+class PathConditions:
     """
     What a path goes through.
 
@@ -113,7 +113,7 @@ class OptimalPath:
     optimality_residual: float
 
 
-def optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
+def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
     """
     Return the laws of least cost through a path, to be judged by their residuals.
 
@@ -129,7 +129,7 @@ def optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
         return _optimal_path(cost, path)
 
 
-def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
+def _optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
     """Return the laws of least cost; numbers out of range are errors."""
     coefficients = cost.characteristic()
     halves = 0.5 * np.diff(path.edges)
@@ -147,18 +147,18 @@ def _optimal_path(cost: QuadraticCost, path: Path) -> OptimalPath:
     slopes = np.zeros(len(bases) - 1)
     for variable, relaxation in enumerate(path.relaxations):
         segments = tuple(
-            MotionLaw(duration=2.0 * half, modes=basis.modes(weight), offset=origin)
+            ExponentialLaw(duration=2.0 * half, modes=basis.modes(weight), offset=origin)
             for basis, half, weight, origin in zip(
                 bases, halves, weights[:, :, variable], origins[variable], strict=True
             )
         )
         laws.append(PiecewiseLaw(edges=path.edges, laws=segments))
         jets = [_probed(law, basis) for law, basis in zip(segments, bases, strict=True)]
-        # The conserved momentum of every segment, in its middle.
-        momenta = np.array([momentum_of(coefficients, jet[:, -1:])[0] for jet in jets])
-        value += momenta @ steps[variable] - _share_of_start(cost, jets[0][:, 0])
+        # Constant along each segment: taken in its middle.
+        costates = np.array([costate(coefficients, jet[:, -1:])[0] for jet in jets])
+        value += costates @ steps[variable] - _share_of_start(cost, jets[0][:, 0])
         joints = np.array([jet[:, 1] for jet in jets[:-1]]).reshape(-1, SOLUTIONS + 1)
-        slopes += 2.0 * np.diff(momenta) * (joints[:, 1] + relaxation * joints[:, 2])
+        slopes += 2.0 * np.diff(costates) * (joints[:, 1] + relaxation * joints[:, 2])
         peaks = _peaks(path.start[variable, 0], jets)
         if not peaks.max() < MAX_DERIVATIVE:
             raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
@@ -191,7 +191,7 @@ def _reference(coefficients: FloatArray) -> FloatArray:
 
 
 def _weights(
-    bases: Sequence[SegmentBasis], halves: FloatArray, path: Path, steps: FloatArray
+    bases: Sequence[SegmentBasis], halves: FloatArray, path: PathConditions, steps: FloatArray
 ) -> Weights:
     """Return the weights of all solutions; equal relaxations share one factorisation."""
     weights = np.empty((len(bases), SOLUTIONS, len(steps)))
@@ -205,7 +205,7 @@ def _weights(
     return Weights(weights, correction)
 
 
-def _probed(law: MotionLaw, basis: SegmentBasis) -> FloatArray:
+def _probed(law: ExponentialLaw, basis: SegmentBasis) -> FloatArray:
     """
     Return derivatives 0 to 12 of a segment at both ends, at probes, and in the middle.
 
@@ -223,7 +223,7 @@ def _near(depth: int) -> FloatArray:
 
 
 def _boundary_residual(
-    path: Path, variable: int, jets: Sequence[FloatArray], peaks: FloatArray
+    path: PathConditions, variable: int, jets: Sequence[FloatArray], peaks: FloatArray
 ) -> float:
     """Return the largest miss of a prescribed quantity or jump up to the fifth derivative."""
     start, values = path.start[variable], path.values[variable]
@@ -274,16 +274,16 @@ def _relative(missed: FloatArray, sizes: FloatArray) -> float:
 
 def _share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
     """
-    Return what a moving start adds to the sum of momenta times steps, with the opposite sign.
+    Return what a moving start adds to the sum of costates times steps, with the opposite sign.
 
-    Sum over i = 1 ... 5 of w^(i) times the momentum (V2) of docs/derivation.md.
+    Sum over i = 1 ... 5 of w^(i) times its costate (V2) of docs/derivation.md.
     """
     share = 0.0
     for i in range(1, CONDITIONS):
         if jet[i] != 0.0:
-            momentum = sum(
+            its_costate = sum(
                 (-1.0) ** m * cost.matrix[i + m] @ jet[1 + m : 1 + m + CONDITIONS]
                 for m in range(CONDITIONS - i)
             )
-            share += momentum * jet[i]
+            share += its_costate * jet[i]
     return float(share)

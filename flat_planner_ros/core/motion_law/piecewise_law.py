@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.motion_law.law import MotionLaw
+from flat_planner_ros.core.motion_law.law import ExponentialLaw
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -37,7 +37,7 @@ class PiecewiseLaw:
     """
 
     edges: FloatArray
-    laws: tuple[MotionLaw, ...]
+    laws: tuple[ExponentialLaw, ...]
 
     def __post_init__(self) -> None:
         """Lock the edges."""

@@ -20,7 +20,7 @@ from itertools import pairwise
 from math import ceil, log2
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.motion_law.law import MotionLaw
+from flat_planner_ros.core.motion_law.law import ExponentialLaw
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,7 +42,7 @@ MAX_PANELS = 2048
 """Bound on the panels, reached by some thousand oscillations within one motion."""
 
 
-def half_quadrature(law: MotionLaw) -> tuple[FloatArray, FloatArray]:
+def half_quadrature(law: ExponentialLaw) -> tuple[FloatArray, FloatArray]:
     """
     Return Gauss-Legendre nodes and weights over the first half of a motion.
 

@@ -27,11 +27,11 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.extremal import (
-    momentum_of,
+    costate,
     stationarity_residual,
     unit_modes,
 )
-from flat_planner_ros.core.motion_law.law import MotionLaw
+from flat_planner_ros.core.motion_law.law import ExponentialLaw
 from flat_planner_ros.core.motion_law.quadrature import half_quadrature
 import numpy as np
 
@@ -90,18 +90,18 @@ class UnitMotion:
         (31) of docs/derivation.md.
     optimality_residual
         (32) of docs/derivation.md, at most, for all coefficients that count as equal.
-    momentum
-        Conserved momentum (33), here also the cost.
+    costate
+        (33) of docs/derivation.md, here also the cost.
     peaks
         Largest magnitudes of the derivatives 0 to 6 at the times of the certificate.
 
     """
 
     coefficients: FloatArray
-    law: MotionLaw
+    law: ExponentialLaw
     boundary_residual: float
     optimality_residual: float
-    momentum: float
+    costate: float
     peaks: FloatArray
 
     def jet(self, after_start: FloatArray, before_end: FloatArray) -> FloatArray:
@@ -187,7 +187,7 @@ def kept_units(key: bytes) -> list[UnitMotion]:
 
 def _certified(coefficients: FloatArray) -> UnitMotion:
     """Return a unit motion with its residuals."""
-    law = MotionLaw(duration=2.0, modes=unit_modes(coefficients))
+    law = ExponentialLaw(duration=2.0, modes=unit_modes(coefficients))
     jet = law.terms.at(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     # Relative to the start, as the value's own peak is the distance.
@@ -198,7 +198,7 @@ def _certified(coefficients: FloatArray) -> UnitMotion:
         law=law,
         boundary_residual=float(miss.max()),
         optimality_residual=stationarity_residual(coefficients, jet) + SAME,
-        momentum=float(momentum_of(coefficients, jet[:, -2])),
+        costate=float(costate(coefficients, jet[:, -2])),
         peaks=peaks,
     )
 

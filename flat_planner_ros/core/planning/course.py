@@ -24,7 +24,12 @@ from functools import cached_property
 from typing import NamedTuple, Protocol
 
 from flat_planner_ros.core.arm import apply_row, FloatArray
-from flat_planner_ros.core.motion_law import CONDITIONS, JET_ORDER, motion_quadrature, MotionLaw
+from flat_planner_ros.core.motion_law import (
+    CONDITIONS,
+    ExponentialLaw,
+    JET_ORDER,
+    motion_quadrature,
+)
 from flat_planner_ros.core.planning.task import even_times, Task
 import numpy as np
 from numpy.typing import ArrayLike
@@ -98,7 +103,7 @@ class RestToRest:
     def laws(self) -> tuple[Law, ...]:
         """Return the law of each planned variable."""
         return tuple(
-            MotionLaw(
+            ExponentialLaw(
                 duration=self.task.duration,
                 modes=self.task.unit.law.modes,
                 factor=distance,

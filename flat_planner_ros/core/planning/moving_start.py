@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law import (
+    BoundaryConditions,
     CONDITIONS,
+    ExponentialLaw,
     extremals,
-    Jets,
     MAX_DERIVATIVE,
-    MotionLaw,
     probes,
     stationarity_residual,
 )
@@ -45,7 +45,7 @@ class CertifiedLaws(NamedTuple):
 
     """
 
-    laws: tuple[MotionLaw, ...]
+    laws: tuple[ExponentialLaw, ...]
     boundary_residual: float
     optimality_residual: float
 
@@ -76,7 +76,9 @@ def laws_to_rest(task: Task, start: FloatArray, final: FloatArray) -> CertifiedL
     ways[:, 0] -= final
     rest = np.zeros(CONDITIONS)
     coefficients = task.cost.characteristic()
-    laws = extremals(coefficients, task.duration, [Jets(start=way, end=rest) for way in ways])
+    laws = extremals(
+        coefficients, task.duration, [BoundaryConditions(start=way, end=rest) for way in ways]
+    )
     powers = (0.5 * task.duration) ** np.arange(CONDITIONS + 1.0)
     normalised = coefficients * powers[::-1] ** 2
     boundary = optimality = 0.0
@@ -97,7 +99,7 @@ def laws_to_rest(task: Task, start: FloatArray, final: FloatArray) -> CertifiedL
     return CertifiedLaws(shifted, boundary, optimality)
 
 
-def _jet(law: MotionLaw) -> FloatArray:
+def _jet(law: ExponentialLaw) -> FloatArray:
     """Return the derivatives 0 to 12 in normalised time where laws are certified, (13, m)."""
     near = probes()[0, :-1]
     after_start = np.concatenate([[0.0], near, 2.0 - near[::-1], [2.0]])

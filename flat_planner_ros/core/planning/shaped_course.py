@@ -17,7 +17,7 @@
 from typing import NamedTuple
 
 from flat_planner_ros.core.insensitive import insensitive_motion, Insensitivity
-from flat_planner_ros.core.motion_law import CONDITIONS, MotionLaw
+from flat_planner_ros.core.motion_law import CONDITIONS, ExponentialLaw
 from flat_planner_ros.core.planning.course import FreeCourse, Law
 from flat_planner_ros.core.planning.task import Task
 import numpy as np
@@ -62,7 +62,7 @@ def shaped_course(
     laws: list[Law] = [shaped.law.over(distance, 0.5 * (start[0] + final[0]))]
     for begin, end in zip(start[1:], final[1:], strict=True):
         laws.append(
-            MotionLaw(
+            ExponentialLaw(
                 duration=task.duration,
                 modes=task.unit.law.modes,
                 factor=end - begin,

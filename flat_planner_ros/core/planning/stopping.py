@@ -15,13 +15,13 @@
 """
 Stopping: the motion that brings a moving arm to rest early, wherever that is easiest.
 
-The final pose is free. Where the cost is least, the momentum that belongs to the value of each
+The final pose is free. Where the cost is least, the costate of each
 planned variable is zero at the end ((S2) of docs/derivation.md); it is linear in the final value,
 so that two laws tell where that is.
 """
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law import CONDITIONS, momentum_of
+from flat_planner_ros.core.motion_law import CONDITIONS, costate
 from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.plan import Plan
 from flat_planner_ros.core.planning.planner import plan
@@ -119,18 +119,18 @@ def _stop(
         )
         for values in (jets[:, 0], jets[:, 0] + PROBE)
     )
-    low, high = _end_momenta(first), _end_momenta(second)
+    low, high = _end_costates(first), _end_costates(second)
     values = jets[:, 0] + PROBE * low / (low - high)
     request = MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets)
     return plan(request, arm, options)
 
 
-def _end_momenta(planned: Plan) -> FloatArray:
-    """Return the momentum of each planned variable at the end, shape (n - 1,)."""
+def _end_costates(planned: Plan) -> FloatArray:
+    """Return the costate of each planned variable at the end, shape (n - 1,)."""
     coefficients = planned.cost.characteristic()
     end = np.array([planned.duration])
     return np.array(
-        [momentum_of(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0] for law in planned.laws]
+        [costate(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0] for law in planned.laws]
     )
 
 

@@ -130,7 +130,7 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
         rates = 1.0 / powers
         largest = float((rates * unit.peaks).max())
     # (35) with every derivative in units of the half duration.
-    cost_value = unit.momentum * half ** (1.0 - 2.0 * CONDITIONS)
+    cost_value = unit.costate * half ** (1.0 - 2.0 * CONDITIONS)
     # A law that is no minimum, which its certificate refuses, might have a negative cost.
     # Roots first: a cost of less than 1e-8 would take the quotient out of range.
     reach = min(MAX_NUMBER / largest, MAX_NUMBER**0.5 / cost_value**0.5) if cost_value > 0 else 0.0

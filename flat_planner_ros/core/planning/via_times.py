@@ -25,7 +25,12 @@ from functools import partial
 from math import inf
 
 from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedPlan
-from flat_planner_ros.core.motion_law import CONDITIONS, optimal_path, Path, QuadraticCost
+from flat_planner_ros.core.motion_law import (
+    CONDITIONS,
+    optimal_path,
+    PathConditions,
+    QuadraticCost,
+)
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,
@@ -49,7 +54,7 @@ MAX_ITERATIONS = 40
 """Bound on the quasi-Newton steps; the cost has long settled then."""
 
 
-def allocate_times(cost: QuadraticCost, path: Path) -> FloatArray:
+def allocate_times(cost: QuadraticCost, path: PathConditions) -> FloatArray:
     """
     Return times of the via points that make a path cheap.
 
@@ -94,7 +99,7 @@ def allocate_times(cost: QuadraticCost, path: Path) -> FloatArray:
     return _edges(found.x, duration)
 
 
-def path_of(request: MotionRequest, task: Task) -> Path:
+def path_of(request: MotionRequest, task: Task) -> PathConditions:
     """Return what the planned variables of a motion go through."""
     final = np.array(planned_at_rest(request.final))
     start = request.start_jets
@@ -104,7 +109,7 @@ def path_of(request: MotionRequest, task: Task) -> Path:
     relaxations = np.zeros(len(final))
     # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
     relaxations[0] = task.flat_map.relaxation
-    return Path(
+    return PathConditions(
         edges=np.array([0.0, *(point.time for point in request.via), request.duration]),
         start=start,
         values=np.column_stack([*(point.values for point in request.via), final]),
@@ -158,13 +163,17 @@ def _edges(logarithms: FloatArray, duration: float) -> FloatArray:
     return np.concatenate([[0.0], duration * inner, [duration]])
 
 
-def _log_cost(cost: QuadraticCost, path: Path, logarithms: FloatArray) -> tuple[float, FloatArray]:
+def _log_cost(
+    cost: QuadraticCost, path: PathConditions, logarithms: FloatArray
+) -> tuple[float, FloatArray]:
     """Return the logarithm of the cost and its gradient."""
     duration = float(path.edges[-1])
     edges = _edges(logarithms, duration)
     found = optimal_path(
         cost,
-        Path(edges=edges, start=path.start, values=path.values, relaxations=path.relaxations),
+        PathConditions(
+            edges=edges, start=path.start, values=path.values, relaxations=path.relaxations
+        ),
     )
     # A longer segment moves all later edges but the last.
     by_length = np.append(np.cumsum(found.time_slopes[::-1])[::-1], 0.0)

@@ -18,10 +18,10 @@ from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.motion_law.extremal import (
-    conserved_momentum,
-    euler_lagrange_residual,
+    BoundaryConditions,
+    costate,
     extremal,
-    Jets,
+    stationarity_residual,
 )
 import numpy as np
 from numpy.polynomial import legendre, Polynomial
@@ -96,12 +96,14 @@ EXACT_ROOTS = {
 def random_jets(rng, rate):
     """Return jets at both ends whose derivatives grow like powers of a rate."""
     size = rate ** np.arange(6.0)
-    return Jets(start=size * rng.normal(size=6), end=size * rng.normal(size=6))
+    return BoundaryConditions(start=size * rng.normal(size=6), end=size * rng.normal(size=6))
 
 
 def rest_to_rest(start, end):
     """Return jets without motion at the ends."""
-    return Jets(start=np.array([start, 0, 0, 0, 0, 0.0]), end=np.array([end, 0, 0, 0, 0, 0.0]))
+    return BoundaryConditions(
+        start=np.array([start, 0, 0, 0, 0, 0.0]), end=np.array([end, 0, 0, 0, 0, 0.0])
+    )
 
 
 def relative_error(found, expected):
@@ -198,34 +200,36 @@ def test_meets_its_jets_and_its_equation(name):
         size = np.abs(terms).sum(axis=0).max()
         worst = np.abs(terms.sum(axis=0)).max() / size if size else 0.0
         assert worst <= 1e-10
-        assert euler_lagrange_residual(coefficients, law, times) == pytest.approx(worst, abs=1e-12)
+        assert stationarity_residual(coefficients, law.jet(times, 12)) == pytest.approx(
+            worst, abs=1e-12
+        )
 
 
 def test_the_residual_sees_another_equation():
     """The law of one weight is far from stationary for another."""
     energy = np.array([0.0, 0, 17.0**8, 0, 0, 0, 1])
     law = extremal(energy, 1.0, rest_to_rest(0.0, 1.0))
-    assert euler_lagrange_residual(1.1 * energy - 0.1 * np.eye(7)[6], law, FRACTIONS) > 1e-3
-    assert euler_lagrange_residual(energy, law, FRACTIONS) < 1e-11
+    assert stationarity_residual(1.1 * energy - 0.1 * np.eye(7)[6], law.jet(FRACTIONS, 12)) > 1e-3
+    assert stationarity_residual(energy, law.jet(FRACTIONS, 12)) < 1e-11
 
 
 def test_a_constant_has_no_residual():
     energy = np.array([0.0, 0, 17.0**8, 0, 0, 0, 1])
     law = extremal(energy, 1.0, rest_to_rest(3.0, 3.0))
     np.testing.assert_array_equal(law(FRACTIONS), 3.0)
-    assert euler_lagrange_residual(energy, law, FRACTIONS) == 0.0
+    assert stationarity_residual(energy, law.jet(FRACTIONS, 12)) == 0.0
 
 
 @pytest.mark.parametrize('name', MATRICES)
-def test_momentum_is_constant_and_times_the_distance_the_cost(name):
+def test_costate_is_constant_and_times_the_distance_the_cost(name):
     matrix = MATRICES[name]
     coefficients = QuadraticCost(matrix=matrix).characteristic()
     for duration in (0.3, 1.0, 3.0):
         law = extremal(coefficients, duration, rest_to_rest(0.4, 1.9))
-        momentum = conserved_momentum(coefficients, law, FRACTIONS * duration)
+        found = costate(coefficients, law.jet(FRACTIONS * duration, 11))
         terms = np.abs(coefficients[1:, None] * law.jet(FRACTIONS * duration, 11)[1::2])
-        assert np.ptp(momentum) <= 1e-9 * terms.sum(axis=0).max()
-        middle = conserved_momentum(coefficients, law, np.array([0.5 * duration]))[0]
+        assert np.ptp(found) <= 1e-9 * terms.sum(axis=0).max()
+        middle = costate(coefficients, law.jet(0.5 * duration, 11))[0]
         times, weights = quadrature(duration)
         cost = weights @ lagrangian(matrix, law.jet(times, 6))
         assert middle * 1.5 == pytest.approx(cost, rel=1e-9)
@@ -346,7 +350,7 @@ def test_stretching_time_stretches_the_law(name):
         law = extremal(
             coefficients * stretch ** (2.0 * orders - 12.0),
             stretch,
-            Jets(start=jets.start * powers[:6], end=jets.end * powers[:6]),
+            BoundaryConditions(start=jets.start * powers[:6], end=jets.end * powers[:6]),
         )
         found = law.jet(FRACTIONS * stretch, 6) / powers[:, None]
         assert relative_error(found, reference) <= TOLERANCE
@@ -357,7 +361,7 @@ def test_laws_are_linear_in_their_ends(name):
     rng = np.random.default_rng(9)
     coefficients = QuadraticCost(matrix=MATRICES[name]).characteristic()
     one, two = random_jets(rng, 3.0), random_jets(rng, 3.0)
-    combined = Jets(start=2.0 * one.start - two.start, end=2.0 * one.end - two.end)
+    combined = BoundaryConditions(start=2.0 * one.start - two.start, end=2.0 * one.end - two.end)
     laws = [extremal(coefficients, 1.0, jets).jet(FRACTIONS, 6) for jets in (one, two, combined)]
     assert relative_error(2.0 * laws[0] - laws[1], laws[2]) <= TOLERANCE
 
@@ -368,7 +372,7 @@ def test_swapped_ends_run_the_law_backwards(name):
     coefficients = QuadraticCost(matrix=MATRICES[name]).characteristic()
     jets, signs = random_jets(rng, 3.0), (-1.0) ** np.arange(7)
     forward = extremal(coefficients, 1.0, jets).jet(FRACTIONS, 6)
-    swapped = Jets(start=signs[:6] * jets.end, end=signs[:6] * jets.start)
+    swapped = BoundaryConditions(start=signs[:6] * jets.end, end=signs[:6] * jets.start)
     backward = extremal(coefficients, 1.0, swapped).jet(FRACTIONS, 6)
     assert relative_error(signs[:, None] * backward[:, ::-1], forward) <= TOLERANCE
 

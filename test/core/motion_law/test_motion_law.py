@@ -14,7 +14,7 @@
 
 """Motion laws against the same functions differentiated in multiple precision."""
 
-from flat_planner_ros.core.motion_law.law import MotionLaw
+from flat_planner_ros.core.motion_law.law import ExponentialLaw
 from flat_planner_ros.core.motion_law.modes import Mode, mode_sum
 import numpy as np
 import pytest
@@ -74,7 +74,7 @@ def exact(mp, law, t, order):
 def test_every_derivative_of_every_kind(mp, kind):
     rng = np.random.default_rng(list(KINDS).index(kind))
     for duration in (0.05, 3.0):
-        law = MotionLaw(duration=duration, modes=(random_mode(rng, kind),))
+        law = ExponentialLaw(duration=duration, modes=(random_mode(rng, kind),))
         times = np.array([0.0, 0.21, 0.5, 0.83, 1.0]) * duration
         expected = exact(mp, law, times, TOP)
         found = law.jet(times, TOP)
@@ -85,7 +85,7 @@ def test_every_derivative_of_every_kind(mp, kind):
 
 def test_a_law_is_the_sum_of_its_modes(mp):
     rng = np.random.default_rng(20)
-    law = MotionLaw(duration=1.7, modes=tuple(random_mode(rng, kind) for kind in KINDS))
+    law = ExponentialLaw(duration=1.7, modes=tuple(random_mode(rng, kind) for kind in KINDS))
     times = np.array([0.0, 0.3, 1.1, 1.7])
     expected = exact(mp, law, times, TOP)
     scale = np.abs(expected).max(axis=1, keepdims=True)
@@ -105,7 +105,7 @@ def test_boundary_layers_are_resolved_at_either_end(mp, rate, wave):
     for origin, times in ((1, duration - depth), (-1, depth)):
         amplitude = np.array([complex(*rng.normal(size=2))])
         mode = Mode(rate=origin * fast, origin=origin, coefficients=tuple(amplitude))
-        law = MotionLaw(duration=duration, modes=(mode,))
+        law = ExponentialLaw(duration=duration, modes=(mode,))
         # Near the end, times are numbers far coarser than depth: the law is at these numbers.
         distance = [(mp.mpf(duration) - mp.mpf(t)) if origin > 0 else mp.mpf(t) for t in times]
         found = law.jet(times, 3)
@@ -121,7 +121,7 @@ def test_boundary_layers_are_resolved_at_either_end(mp, rate, wave):
 
 def test_nothing_overflows_and_far_layers_vanish():
     growing = Mode(rate=1e9 + 0j, origin=1, coefficients=(1.0 + 0j,))
-    law = MotionLaw(duration=2.0, modes=(growing, growing.mirrored(-1.0)))
+    law = ExponentialLaw(duration=2.0, modes=(growing, growing.mirrored(-1.0)))
     with np.errstate(over='raise', invalid='raise'):
         found = law.jet(np.array([0.0, 0.5, 1.0, 1.5, 2.0]), 12)
     np.testing.assert_array_equal(found[0], [-1.0, 0.0, 0.0, 0.0, 1.0])
@@ -144,7 +144,7 @@ def test_mirrored_is_the_function_run_backwards(kind, sign):
 
 def test_transformed_scales_every_derivative_and_offsets_the_value():
     rng = np.random.default_rng(23)
-    law = MotionLaw(duration=0.7, modes=tuple(random_mode(rng, kind) for kind in KINDS))
+    law = ExponentialLaw(duration=0.7, modes=tuple(random_mode(rng, kind) for kind in KINDS))
     times = np.linspace(0.0, 0.7, 15)
     before = law.jet(times, TOP)
     found = law.transformed(-2.5, 40.0).jet(times, TOP)
@@ -156,7 +156,7 @@ def test_transformed_scales_every_derivative_and_offsets_the_value():
 
 
 def test_a_single_time_is_a_vector_of_one():
-    law = MotionLaw(
+    law = ExponentialLaw(
         duration=2.0, modes=(Mode(rate=0j, origin=0, coefficients=(1.0 + 0j, 3.0 + 0j)),)
     )
     np.testing.assert_allclose(law(1.5), [2.5], rtol=1e-15)

@@ -19,8 +19,8 @@ from functools import partial
 from flat_planner_ros.core.arm.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
-from flat_planner_ros.core.motion_law.extremal import extremal, Jets
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, Path
+from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremal
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 from flat_planner_ros.core.motion_law.segment_basis import segment_basis
 import numpy as np
 from path_programme import programmed_path
@@ -75,7 +75,7 @@ def costs():
 
 def path(edges, values, start=AT_REST, relaxation=0.0):
     """Return a path of one variable."""
-    return Path(
+    return PathConditions(
         edges=np.array(edges, dtype=float),
         start=np.array([start]),
         values=np.array([values], dtype=float),
@@ -191,7 +191,9 @@ def test_fifty_points_of_three_variables(costs, name):
     values = rng.normal(size=(3, 51))
     found = certified(
         costs[name],
-        Path(edges=edges, start=start, values=values, relaxations=np.array([RELAXATION, 0, 0])),
+        PathConditions(
+            edges=edges, start=start, values=values, relaxations=np.array([RELAXATION, 0, 0])
+        ),
     )
     for index, (law, passed) in enumerate(zip(found.laws, values, strict=True)):
         jet = law.jet(edges[1:], 1)
@@ -233,7 +235,7 @@ def test_a_path_continues_itself(costs, name):
 
 @pytest.mark.parametrize('name', STRATEGIES)
 def test_a_point_on_the_way_changes_nothing(costs, name):
-    ends = Jets(start=AT_REST, end=np.array([1.0, 0, 0, 0, 0, 0]))
+    ends = BoundaryConditions(start=AT_REST, end=np.array([1.0, 0, 0, 0, 0, 0]))
     direct = extremal(costs[name].characteristic(), 1.0, ends)
     edges = np.array([0.0, 0.3, 0.55, 1.0])
     jet = direct.jet(edges[1:], 1)
@@ -355,6 +357,6 @@ def test_impossible_paths_are_refused(change, message):
         'values': [[1.0, 2.0, 0.0]],
         'relaxations': [0.0],
     }
-    Path(**valid)
+    PathConditions(**valid)
     with pytest.raises(InvalidRequest, match=message):
-        Path(**{**valid, **change})
+        PathConditions(**{**valid, **change})

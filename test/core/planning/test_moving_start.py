@@ -19,7 +19,7 @@ from dataclasses import replace
 from core.conftest import ELBOW
 from flat_planner_ros.core.arm.errors import UncertifiedPlan
 from flat_planner_ros.core.motion_law.cost import Strategy
-from flat_planner_ros.core.motion_law.extremal import Jets
+from flat_planner_ros.core.motion_law.extremal import BoundaryConditions
 from flat_planner_ros.core.planning import moving_start
 from flat_planner_ros.core.planning import plan as certified_plan
 from flat_planner_ros.core.planning.planner import plan
@@ -183,7 +183,7 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, arm, damage):
     def wrong(coefficients, duration, jets):
         if damage == 'optimality':
             return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1], duration, jets)
-        near = [Jets(start=ends.start * (1.0 + 1e-8), end=ends.end) for ends in jets]
+        near = [BoundaryConditions(start=ends.start * (1.0 + 1e-8), end=ends.end) for ends in jets]
         return compute(coefficients, duration, near)
 
     monkeypatch.setattr(moving_start, 'extremals', wrong)
