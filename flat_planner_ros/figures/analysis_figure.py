@@ -16,10 +16,14 @@
 
 from pathlib import Path
 from textwrap import fill
+from typing import Any, TYPE_CHECKING
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor import PlannedMotion, VibrationReport
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MILLI = 1e3
 """Residuals are drawn in mrad."""
@@ -81,7 +85,7 @@ def draw(
 
 
 def _draw_positions(
-    axis, motion: PlannedMotion, elapsed: FloatArray, positions: FloatArray, last: float
+    axis: 'Axes', motion: PlannedMotion, elapsed: FloatArray, positions: FloatArray, last: float
 ) -> None:
     """Draw each joint as planned and as measured."""
     times = np.append(motion.times, last)
@@ -96,26 +100,35 @@ def _draw_positions(
 
 
 def _draw_residual(
-    axis, report: VibrationReport, elapsed: FloatArray, residual: FloatArray, end: float
+    axis: 'Axes', report: VibrationReport, elapsed: FloatArray, residual: FloatArray, end: float
 ) -> None:
     """Draw how far each joint is from the plan, and the envelope fitted after the motion."""
     for joint, name in enumerate(report.joint_names):
         _plot(axis, elapsed, residual[:, joint], color=f'C{joint}', label=name)
-    fit = report.fit
     after = elapsed[(elapsed >= end) & (elapsed <= end + report.window)]
-    if None not in (fit.amplitude, fit.decay, fit.bias, fit.drift) and after.size:
-        times = np.linspace(end, after[-1], 200)
-        envelope = fit.amplitude * np.exp(-fit.decay * (times - end))
-        middle = fit.bias + fit.drift * (times - 0.5 * (after[0] + after[-1]))
-        label = f'envelope fitted to {report.joint}'
-        axis.plot(times, MILLI * (middle + envelope), color='C3', linewidth=1.0, label=label)
-        axis.plot(times, MILLI * (middle - envelope), color='C3', linewidth=1.0)
-        axis.plot(end, MILLI * (middle[0] + envelope[0]), 'o', color='C3', markersize=4)
+    if after.size:
+        _draw_envelope(axis, report, end, after)
     axis.set_ylabel('measured − planned [mrad]')
     axis.legend(loc='best', fontsize=8)
 
 
-def _draw_efforts(axis, motion: PlannedMotion, elapsed: FloatArray, efforts: FloatArray) -> None:
+def _draw_envelope(axis: 'Axes', report: VibrationReport, end: float, after: FloatArray) -> None:
+    """Draw the envelope of the oscillation after the motion, if one was fitted."""
+    fit = report.fit
+    if fit.amplitude is None or fit.decay is None or fit.bias is None or fit.drift is None:
+        return
+    times = np.linspace(end, after[-1], 200)
+    envelope = fit.amplitude * np.exp(-fit.decay * (times - end))
+    middle = fit.bias + fit.drift * (times - 0.5 * (after[0] + after[-1]))
+    label = f'envelope fitted to {report.joint}'
+    axis.plot(times, MILLI * (middle + envelope), color='C3', linewidth=1.0, label=label)
+    axis.plot(times, MILLI * (middle - envelope), color='C3', linewidth=1.0)
+    axis.plot(end, MILLI * (middle[0] + envelope[0]), 'o', color='C3', markersize=4)
+
+
+def _draw_efforts(
+    axis: 'Axes', motion: PlannedMotion, elapsed: FloatArray, efforts: FloatArray
+) -> None:
     """Draw the efforts of the actuated joints."""
     for joint, name in enumerate(motion.joint_names[:-1]):
         if np.isfinite(efforts[:, joint]).any():
@@ -129,7 +142,7 @@ def _draw_efforts(axis, motion: PlannedMotion, elapsed: FloatArray, efforts: Flo
         axis.legend(loc='best', fontsize=8)
 
 
-def _plot(axis, times: FloatArray, values: FloatArray, **style: object) -> None:
+def _plot(axis: 'Axes', times: FloatArray, values: FloatArray, **style: Any) -> None:
     """Draw a line that breaks where samples were lost."""
     holes = np.flatnonzero(np.diff(times) > LONGEST_STEP) + 1
     axis.plot(np.insert(times, holes, np.nan), np.insert(values, holes, np.nan), **style)

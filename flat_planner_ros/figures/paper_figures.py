@@ -60,6 +60,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
 
     """
     from flat_planner_ros.figures.file_plot import plt
+    from matplotlib.ticker import MultipleLocator
 
     scenarios = list(dict.fromkeys(result.scenario for result in results))
     figure, axes = plt.subplots(
@@ -87,7 +88,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
                 axis.set_ylabel(label)
         axes[-1, column].set_xlabel('time [s]')
         axes[-1, column].set_xlim(0.0, DURATION + SHOWN_AFTER)
-        axes[-1, column].xaxis.set_major_locator(plt.MultipleLocator(TICKS))
+        axes[-1, column].xaxis.set_major_locator(MultipleLocator(TICKS))
     lines = [
         line for axis in axes[0] for line in zip(*axis.get_legend_handles_labels(), strict=True)
     ]

@@ -111,7 +111,7 @@ class LiveNode(Node):
 
     """
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, **options: Any) -> None:
         """Open the interface."""
         super().__init__(LIVE_VIEW, **options)
         self.feed = Feed(STREAMS)
@@ -198,8 +198,8 @@ class LiveNode(Node):
         """Add a row: time, positions, velocities and efforts, NaN where unknown."""
         if not conversions.is_stamped(msg):
             msg.header.stamp = self.get_clock().now().to_msg()
-        if not self._joints:
-            self._use_joints(msg.name)
+        if self._reader is None or not self._joints:
+            self._reader = self._use_joints(msg.name)
         try:
             sample = self._reader.read(msg)
         except FlatPlannerError:
@@ -219,7 +219,7 @@ class LiveNode(Node):
         except FlatPlannerError:
             return
         if tuple(self._joints) != motion.joint_names:
-            self._use_joints(motion.joint_names)
+            self._reader = self._use_joints(motion.joint_names)
         plan = {
             'start': self._relative(motion.start),
             'end': self._relative(motion.end),
@@ -254,12 +254,12 @@ class LiveNode(Node):
             }
             self.feed.put('report', report)
 
-    def _use_joints(self, names: Sequence[str]) -> None:
-        """Show these joints from now on."""
+    def _use_joints(self, names: Sequence[str]) -> conversions.JointStateReader:
+        """Show these joints from now on; return their reader."""
         self._joints = list(names)
-        self._reader = conversions.JointStateReader(self._joints)
         self.feed.restart()
         self.feed.put('joints', list(names))
+        return conversions.JointStateReader(self._joints)
 
     def _relative(self, time: float) -> float:
         """Return a time from the origin of the page's axis, a new one if time has gone back."""

@@ -62,9 +62,9 @@ Obey = Callable[[Mapping[str, Any]], Awaitable[tuple[bool, str]]]
 """Carries out a browser's command; returns whether it did, and a sentence."""
 
 FEED = web.AppKey('feed', Feed)
-OBEY = web.AppKey('obey', object)
-HOSTS = web.AppKey('hosts', object)
-BROWSERS = web.AppKey('browsers', set)
+OBEY: web.AppKey[Obey] = web.AppKey('obey')
+HOSTS: web.AppKey[Collection[str]] = web.AppKey('hosts')
+BROWSERS: web.AppKey[set[web.WebSocketResponse]] = web.AppKey('browsers')
 
 
 def application(feed: Feed, obey: Obey, hosts: Collection[str] = ()) -> web.Application:
@@ -230,5 +230,6 @@ async def _reply(text: str, obey: Obey) -> dict[str, Any]:
 
 async def _dismiss(app: web.Application) -> None:
     """Close all connections."""
-    for ws in list(app[BROWSERS]):
+    browsers = app[BROWSERS]
+    for ws in list(browsers):
         await ws.close(code=1001, message=b'the live view has ended')

@@ -19,6 +19,7 @@ from flat_planner_ros.ros.wire import conversions
 import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.timer import Timer
 
 FINAL_ZEROS = 10
 """Zeros at the end of a motion: one that is lost leaves no joint driven."""
@@ -46,7 +47,7 @@ class EffortStream:
         """Stream nothing until configured."""
         self._node, self._session = node, session
         self._publisher = publisher
-        self._timer = None
+        self._timer: Timer | None = None
         self._period = 0.0
         self._zeros_left = 0
 
@@ -72,8 +73,9 @@ class EffortStream:
     def _on_tick(self) -> None:
         """Publish the effort planned for the middle of the coming period."""
         now = conversions.seconds(self._node.get_clock().now().to_msg())
-        if self._session.moves(now, now + self._period):
-            samples = self._session.reference(now + 0.5 * self._period)
+        is_moving = self._session.moves(now, now + self._period)
+        samples = self._session.reference(now + 0.5 * self._period) if is_moving else None
+        if samples is not None:
             self._zeros_left = FINAL_ZEROS
             self._publish(samples.efforts[0, :-1])
         elif self._zeros_left:

@@ -17,6 +17,7 @@
 from collections.abc import Sequence
 import sys
 from threading import Thread
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
@@ -37,6 +38,7 @@ from flat_planner_ros.ros.parameters.declaration import (
 )
 from flat_planner_ros.ros.parameters.monitor import build, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -65,7 +67,7 @@ WARNING_PERIOD = 5.0
 class MonitorNode(Node):
     """Judges the oscillation after each motion of the latched plan."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.MONITOR, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
@@ -85,8 +87,9 @@ class MonitorNode(Node):
         self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.
-        self._steady = steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._ticked = steady.now().nanoseconds
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._steady = steady
+        self._ticked = steady.now()
         self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
         self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
@@ -167,8 +170,8 @@ class MonitorNode(Node):
 
     def _on_tick(self) -> None:
         """Notice silence, unless the node itself has been busy: samples may be waiting then."""
-        steady = self._steady.now().nanoseconds
-        elapsed, self._ticked = (steady - self._ticked) / conversions.NANOSECONDS, steady
+        before, self._ticked = self._ticked, self._steady.now()
+        elapsed = (self._ticked - before).nanoseconds / NANOSECONDS
         if elapsed > LATE_TICK:
             return
         now, plan = self._stamps.now(self._now()), self._plan

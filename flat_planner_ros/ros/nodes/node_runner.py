@@ -121,7 +121,7 @@ def _pardon_shutdown(node: Node) -> None:
     The executor would log each of them as fatal, with a traceback, before `run` sees it.
     """
 
-    def pardoned(callback: Callable) -> Callable:
+    def pardoned(callback: Callable[..., Any]) -> Callable[..., Any]:
         # Its signature, too: a subscription may ask for more than the message.
         @wraps(callback)
         def call(*args: Any) -> Any:
@@ -134,7 +134,8 @@ def _pardon_shutdown(node: Node) -> None:
 
         return call
 
-    for entity in (*node.timers, *node.subscriptions, *node.services):
+    entities: list[Any] = [*node.timers, *node.subscriptions, *node.services]
+    for entity in entities:
         entity.callback = pardoned(entity.callback)
 
 
@@ -151,7 +152,10 @@ def _init(args: Sequence[str] | None) -> None:
     set_logger_level(RCL, LoggingSeverity.FATAL)
     try:
         try:
-            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(
+                args=None if args is None else list(args),
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
         except RuntimeError as error:
             if NO_LOGGING not in str(error):
                 raise

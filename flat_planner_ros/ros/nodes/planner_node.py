@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 import sys
 from time import perf_counter
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
@@ -50,7 +51,7 @@ LOADING_DELAY = 0.001
 class PlannerNode(Node):
     """Answers goals with motions of one arm."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)

@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 import sys
+from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidCommand
 from flat_planner_ros.core.plant import ArmState, PacedArm
@@ -24,6 +25,7 @@ from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.declaration import InvalidParameter, NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
@@ -43,7 +45,7 @@ WARNING_PERIOD = 1.0
 class PlantNode(Node):
     """Moves one simulated arm."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.PLANT, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
@@ -136,7 +138,7 @@ class PlantNode(Node):
         """Go on to the present and publish what was passed."""
         settings = self._settings
         if settings.publish_clock:
-            wall = self._steady.now().nanoseconds / conversions.NANOSECONDS
+            wall = self._steady.now().nanoseconds / NANOSECONDS
             samples = self._arm.lead(wall, settings.real_time_factor)
         else:
             samples = self._arm.follow(conversions.seconds(self.get_clock().now().to_msg()))

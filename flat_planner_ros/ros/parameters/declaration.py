@@ -96,7 +96,7 @@ class Row:
         """Return the type of its value."""
         if isinstance(self.default, Parameter.Type):
             return self.default
-        return Parameter.Type.from_parameter_value(self.default)
+        return Parameter.Type(Parameter.Type.from_parameter_value(self.default))
 
     @property
     def constraints(self) -> str:

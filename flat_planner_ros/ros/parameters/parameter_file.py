@@ -45,7 +45,7 @@ ASSIGNMENT = ':='
 """Between name and value of an override, as ROS writes it."""
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
     """Reads numbers as ROS does: 1e-4 is one, although YAML 1.1 asks for a decimal point."""
 
 

@@ -194,11 +194,11 @@ def _recorded_reports(
     """Return the values of the reports that the monitor gave at the time, by start of motion."""
     namespace = sources.plan.removesuffix(interfaces.of(interfaces.PLANNER, interfaces.PLAN))
     topic = namespace + interfaces.of(interfaces.MONITOR, interfaces.REPORT)
-    reports = {}
+    reports: dict[float, Mapping[str, Any]] = {}
     for entry in recording.entries({topic}):
         msg = deserialize_message(entry.message, message_class(entry.kind))
         for status in msg.status:
-            values = {pair.key: _value(pair.value) for pair in status.values}
+            values: dict[str, Any] = {pair.key: _value(pair.value) for pair in status.values}
             if 'start_time' in values:
                 reports[values['start_time']] = values
     return reports

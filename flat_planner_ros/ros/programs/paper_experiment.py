@@ -109,7 +109,9 @@ class Experimenter(Node):
 
     """
 
-    def __init__(self, speed: float, processes: Sequence[Popen], interrupted: Event) -> None:
+    def __init__(
+        self, speed: float, processes: Sequence[Popen[bytes]], interrupted: Event
+    ) -> None:
         """Open the topics and services of the three nodes."""
         super().__init__('paper_table')
         self._lead = LEAD * max(speed, 1.0)
@@ -349,11 +351,18 @@ def _recording(states: Sequence[JointState], start: float) -> Recording:
     return Recording(
         times=np.array([sample.time for sample in samples]) - start,
         positions=np.array([sample.positions for sample in samples]),
-        efforts=np.array([sample.efforts[0] for sample in samples]),
+        efforts=np.array([_of_joint_1(sample.efforts) for sample in samples]),
     )
 
 
 def _planned_efforts(plan: JointTrajectory) -> tuple[FloatArray, FloatArray]:
     """Return times [s] and efforts of joint 1 [N m]."""
     motion = conversions.planned_motion_from_trajectory(plan)
-    return motion.times, motion.efforts[:, 0]
+    return motion.times, _of_joint_1(motion.efforts)
+
+
+def _of_joint_1(efforts: FloatArray | None) -> FloatArray:
+    """Return the effort of joint 1, of one sample or of all points of a plan."""
+    if efforts is None:
+        raise ExperimentFailed('there are no efforts to compare')
+    return efforts[..., 0]

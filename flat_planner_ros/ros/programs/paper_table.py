@@ -109,7 +109,8 @@ def main(args: Sequence[str] | None = None) -> int:
     speed = 1.0 if options.real_time else SPEED
     try:
         with signals_caught() as interrupted:
-            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            arguments = None if args is None else list(args)
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             refuse_company(interrupted)
             results = _results(speed, BEYOND if options.beyond else CASES, interrupted)
         print(REMARKS, flush=True)
@@ -169,7 +170,7 @@ def _results(
 
 
 @contextmanager
-def _node_processes(speed: float) -> Iterator[list[subprocess.Popen]]:
+def _node_processes(speed: float) -> Iterator[list[subprocess.Popen[bytes]]]:
     """Run planner, plant and monitor, the plant owning the time."""
     parameters = {
         'planner': {

@@ -111,7 +111,7 @@ class RecorderNode(Node):
         *,
         everything: bool = False,
         overwrite: bool = False,
-        **options: object,
+        **options: Any,
     ) -> None:
         """Open the file and listen."""
         super().__init__(RECORDER, **options)

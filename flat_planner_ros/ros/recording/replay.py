@@ -32,6 +32,7 @@ from flat_planner_ros.ros.recording.recording import Entry, Recording
 from flat_planner_ros.ros.wire import conversions
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, of, PLAN, PLANNER
 from flat_planner_ros.ros.wire.message_types import message_class
+from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
 from rclpy.serialization import deserialize_message
 
@@ -167,7 +168,7 @@ class _Player:
         """Take a message; one that cannot be used is left out, as in the node."""
         msg = deserialize_message(entry.message, message_class(entry.kind))
         if not conversions.is_stamped(msg):
-            msg.header.stamp = conversions.time_msg(entry.time / conversions.NANOSECONDS)
+            msg.header.stamp = conversions.time_msg(entry.time / NANOSECONDS)
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
         with suppress(FlatPlannerError):
             take(msg)

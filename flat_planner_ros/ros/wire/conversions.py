@@ -41,7 +41,7 @@ MAX_GOAL_BYTES = 100_000
 
 def seconds(time: Time | Duration) -> float:
     """Return a stamp or a duration in seconds."""
-    return time.sec + time.nanosec / NANOSECONDS
+    return float(time.sec + time.nanosec / NANOSECONDS)
 
 
 def time_msg(time: float) -> Time:
@@ -77,11 +77,12 @@ def message_of(data: bytes, message_type: type[Message]) -> Message:
             limit=float(MAX_GOAL_BYTES),
         )
     try:
-        return deserialize_message(data, message_type)
+        message: Message = deserialize_message(data, message_type)
     except RuntimeError as error:
         raise RequestRejected(
             Reason.INVALID_GOAL, f'the goal cannot be read: {_first_line(error)}'
         ) from error
+    return message
 
 
 def points_of(data: bytes) -> PointTable:
@@ -370,7 +371,7 @@ def _split(time: float) -> tuple[int, int]:
     return int(sec) + carry, nanosec
 
 
-def _doubles(values: FloatArray) -> array:
+def _doubles(values: FloatArray) -> 'array[float]':
     """Return what a float64[] field takes without looking at every number."""
     return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
 
@@ -402,7 +403,9 @@ def _optional_table(points: PointTable, field: str) -> FloatArray | None:
     return _table(points, field)
 
 
-def _optional(values: array, count: int, indices: NDArray[np.intp] | slice) -> FloatArray | None:
+def _optional(
+    values: 'array[float]', count: int, indices: NDArray[np.intp] | slice
+) -> FloatArray | None:
     """Return the wanted entries of an array that may be empty."""
     if len(values) != count:
         return None

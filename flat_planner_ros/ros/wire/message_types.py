@@ -96,8 +96,8 @@ def _parts(name: str) -> tuple[str, str, str]:
 
 def _definition_file(package: str, kind: str) -> Path:
     """Return the installed definition, beside the installed Python package."""
-    module = Path(import_module(package).__file__)
-    for prefix in module.parents:
+    module = import_module(package)
+    for prefix in Path(str(module.__file__)).parents:
         path = prefix / 'share' / package / 'msg' / f'{kind}.msg'
         if path.is_file():
             return path

@@ -147,12 +147,13 @@ class _Front:
         """Return the stamp of the header [s]."""
         begin = self._taken(2 * LENGTH)
         sec, nanosec = unpack_from(self._stamp, self._data, begin)
-        return sec + nanosec / NANOSECONDS
+        return float(sec + nanosec / NANOSECONDS)
 
     def length(self, size: int) -> int:
         """Return the length of a sequence whose entries take at least some bytes each."""
         self.at += -self.at % LENGTH
-        (length,) = self._length.unpack_from(self._data, self._taken(LENGTH))
+        (entry,) = self._length.unpack_from(self._data, self._taken(LENGTH))
+        length = int(entry)
         if length * size > len(self._data):
             raise _Unusual
         return length
