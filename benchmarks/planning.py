@@ -95,7 +95,7 @@ def sections(options: Namespace) -> list[Section]:
 def answer(made: Plan) -> problem.Answer:
     """Return y to y^(6) and the torque of a plan at the 1001 times."""
     samples = made.sample(made.request.duration / (problem.SAMPLES - 1))
-    return problem.Answer(samples.planned[0], samples.torque)
+    return problem.Answer(samples.planned[0], samples.driving_effort)
 
 
 def new_task() -> Task:

@@ -63,7 +63,7 @@ nothing = UncertaintyBox(stiffness=0.0, damping=0.0)
 worst = {}
 for motion in (least, insensitive):
     name = motion.options.strategy.value
-    torque = motion.sample(0.001).torque
+    torque = motion.sample(0.001).driving_effort
     left = [
         predict_residual(arm.scaled(stiffness=factor), torque, motion.duration, nothing).nominal
         for factor in factors

@@ -43,7 +43,7 @@ for rate in (0.0, 12.0, 17.0, 24.0):  # weight of the velocity, as an angular fr
         f'largest torque {1e3 * motion.peak_effort[0]:6.1f} mN m'
     )
     speed.plot(samples.times, samples.flat[0, 1], label=f'$Q_{{11}} = ({rate:g}/s)^{{10}}$')
-    torque.plot(samples.times, 1e3 * samples.torque)
+    torque.plot(samples.times, 1e3 * samples.driving_effort)
 
 speed.set_ylabel('last link [rad/s]')
 speed.legend(frameon=False)

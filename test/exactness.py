@@ -29,7 +29,7 @@ from flat_planner_ros.core.arm.errors import UncertifiedPlan
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy
-from flat_planner_ros.core.planning.plan import Plan
+from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
@@ -272,16 +272,16 @@ def relative_error(case: Case, found: Plan, is_checked: bool) -> float:
             again = exact_jets(scaled, times / half)
         assert (np.abs(again - expected) <= ORACLE_TOLERANCE * peak).all()
     rates = half ** -np.arange(7.0)[:, None]
-    jet = found.laws[0].jet(times, 6) / rates
+    jet = found.trajectory.laws[0].jet(times, 6) / rates
     jet[0] -= 0.5
     samples = found.at(times)
-    row = found.flat_map.effort
+    row = found.problem.flat_map.effort
     torque = row @ (rates * expected)[: len(row)]
     scale = np.abs(row[:, None] * (rates * expected)[: len(row)]).sum(axis=0).max()
     return float(
         max(
             np.max(np.abs(jet - expected) / peak),
-            np.abs(samples.torque - torque)[1:-1].max() / scale,
+            np.abs(samples.driving_effort - torque)[1:-1].max() / scale,
         )
     )
 
@@ -289,7 +289,7 @@ def relative_error(case: Case, found: Plan, is_checked: bool) -> float:
 def certified(case: Case, found: Plan, rng: np.random.Generator) -> tuple[float, float, float]:
     """Return the residuals of the ends and of the equation, and the most a perturbation gains."""
     duration = case.duration
-    a = QuadraticCost(matrix=found.cost.matrix).characteristic()
+    a = QuadraticCost(matrix=found.problem.cost.matrix).characteristic()
     x, w = np.polynomial.legendre.leggauss(8)
     edges = np.concatenate([[0.0], np.geomspace(1e-10, 0.5, 24)])
     widths = np.diff(edges)[:, None]
@@ -297,7 +297,7 @@ def certified(case: Case, found: Plan, rng: np.random.Generator) -> tuple[float,
     fractions = np.concatenate([[0.0], near, 1.0 - near[::-1], [1.0]])
     weights = np.tile((0.5 * widths * w).ravel(), (2, 1))
     weights = np.concatenate([[0.0], weights[0], weights[1, ::-1], [0.0]]) * duration
-    jet = found.laws[0].jet(fractions * duration, 12)
+    jet = found.trajectory.laws[0].jet(fractions * duration, 12)
     terms = a[1:, None] * jet[2::2]
     size = np.abs(terms).sum(axis=0).max() or 1.0  # A polynomial has no terms.
     equation = terms.sum(axis=0)
@@ -314,7 +314,7 @@ def certified(case: Case, found: Plan, rng: np.random.Generator) -> tuple[float,
         own = (
             0.5
             * duration
-            * np.einsum('im,ij,jm,m->', change, found.cost.matrix, change, node_weights)
+            * np.einsum('im,ij,jm,m->', change, found.problem.cost.matrix, change, node_weights)
         )
         # Integrated by parts, the cost rises by 2 s (v, equation) + s^2 (own cost of v).
         scale = CHANGE * np.sqrt(found.cost_value / own)
@@ -331,7 +331,7 @@ def grid_difference(found: Plan, intervals: int) -> float:
     assert len(samples.times) == intervals + 1
     again = found.at(samples.times)
     difference = np.abs(samples.planned - again.planned).max(axis=2)
-    return float((difference[0] / found.task.unit.peaks / found.task.rates).max())
+    return float((difference[0] / found.problem.unit.peaks / found.problem.rates).max())
 
 
 def findings(seed: int, number: int) -> Findings:

@@ -15,22 +15,22 @@
 """Planning: from what is asked to a certified plan within the limits."""
 
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
-from flat_planner_ros.core.planning.course import Law
+from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
+from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation, TimedPlan
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
-from flat_planner_ros.core.planning.plan import Plan
-from flat_planner_ros.core.planning.plan_samples import PlanSamples
 from flat_planner_ros.core.planning.planner import plan
-from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
+from flat_planner_ros.core.planning.reference_trajectory import Law
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,
     PlanningOptions,
+    Reason,
+    RequestRejected,
     ViaPoint,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
 from flat_planner_ros.core.planning.stopping import stop_plan
-from flat_planner_ros.core.planning.timing import OnViolation, TimedPlan, Timing
 from flat_planner_ros.core.planning.tradeoff import (
     baselines,
     duration_advice,
@@ -65,7 +65,7 @@ __all__ = [
     'shortest_plan',
     'stop_plan',
     'TimedPlan',
-    'Timing',
+    'DurationRules',
     'tradeoff_points',
     'TradeoffPoint',
     'ViaPoint',

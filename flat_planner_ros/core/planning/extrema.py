@@ -27,8 +27,7 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law import CONDITIONS
-from flat_planner_ros.core.planning.plan import Plan
-from flat_planner_ros.core.planning.plan_samples import PlanSamples
+from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
 import numpy as np
 from numpy.typing import NDArray
 
@@ -170,7 +169,7 @@ def extrema_of(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> 
 
 def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     """Return series of all joints' quantities, in the order of quantities and joints."""
-    edges = np.array(plan.course.edges)
+    edges = np.array(plan.trajectory.edges)
     fractions = np.array([0.0, 0.125, 0.5, 0.875])
     bounds = np.append((edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel(), edges[-1])
     starts, lengths = bounds[:-1], np.diff(bounds)

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
-from flat_planner_ros.core.planning.plan import Plan
 import numpy as np
 
 ROUNDING = 1e-9

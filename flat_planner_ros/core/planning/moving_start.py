@@ -26,7 +26,7 @@ from flat_planner_ros.core.motion_law import (
     probes,
     stationarity_residual,
 )
-from flat_planner_ros.core.planning.task import Task
+from flat_planner_ros.core.planning.problem import MotionProblem
 import numpy as np
 
 
@@ -50,13 +50,13 @@ class CertifiedLaws(NamedTuple):
     optimality_residual: float
 
 
-def laws_to_rest(task: Task, start: FloatArray, final: FloatArray) -> CertifiedLaws:
+def laws_to_rest(problem: MotionProblem, start: FloatArray, final: FloatArray) -> CertifiedLaws:
     """
     Return the optimal laws from given derivatives to rest.
 
     Parameters
     ----------
-    task
+    problem
         Equation and duration.
     start
         Derivatives 0 to 5 of every planned variable, shape (n - 1, 6) [rad/s^k].
@@ -75,11 +75,11 @@ def laws_to_rest(task: Task, start: FloatArray, final: FloatArray) -> CertifiedL
     ways = start.copy()
     ways[:, 0] -= final
     rest = np.zeros(CONDITIONS)
-    coefficients = task.cost.characteristic()
+    coefficients = problem.cost.characteristic()
     laws = extremals(
-        coefficients, task.duration, [BoundaryConditions(start=way, end=rest) for way in ways]
+        coefficients, problem.duration, [BoundaryConditions(start=way, end=rest) for way in ways]
     )
-    powers = (0.5 * task.duration) ** np.arange(CONDITIONS + 1.0)
+    powers = (0.5 * problem.duration) ** np.arange(CONDITIONS + 1.0)
     normalised = coefficients * powers[::-1] ** 2
     boundary = optimality = 0.0
     for law, way in zip(laws, ways, strict=True):

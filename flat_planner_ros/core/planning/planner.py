@@ -26,18 +26,22 @@ from flat_planner_ros.core.arm import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.motion_law import optimal_path, Strategy
-from flat_planner_ros.core.planning.course import Course, FreeCourse, Law, RestToRest
+from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Plan, PlanSamples
 from flat_planner_ros.core.planning.moving_start import laws_to_rest
-from flat_planner_ros.core.planning.plan import BOUNDARY_TOLERANCE, Plan
-from flat_planner_ros.core.planning.plan_samples import PlanSamples
+from flat_planner_ros.core.planning.problem import MotionProblem, problem_of
+from flat_planner_ros.core.planning.reference_trajectory import (
+    Law,
+    LawTrajectory,
+    ReferenceTrajectory,
+    RestToRestTrajectory,
+)
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,
     PlanningOptions,
     ViaPoint,
 )
-from flat_planner_ros.core.planning.shaped_course import shaped_course
-from flat_planner_ros.core.planning.task import Task, task_of
+from flat_planner_ros.core.planning.shaped_trajectory import shaped_trajectory
 from flat_planner_ros.core.planning.via_times import path_of
 import numpy as np
 
@@ -77,76 +81,86 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
     """
     _check_fit(request, arm)
     try:
-        task = task_of(arm, options, request.duration)
+        problem = problem_of(arm, options, request.duration)
         if request.via:
-            return _through_points(request, options, task)
+            return _through_points(request, options, problem)
         if request.start_jets is not None:
-            return _from_motion(request, options, task, request.start_jets)
+            return _from_motion(request, options, problem, request.start_jets)
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE) from error
-    return _from_rest(request, options, task)
+    return _from_rest(request, options, problem)
 
 
-def _from_rest(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
+def _from_rest(request: MotionRequest, options: PlanningOptions, problem: MotionProblem) -> Plan:
     """Return a plan whose planned variables are multiples of the unit motion."""
     start, final = planned_at_rest(request.start), planned_at_rest(request.final)
     distances = tuple(
         [0.0 if abs(b - a) < NO_DISTANCE else b - a for a, b in zip(start, final, strict=True)]
     )
-    if not all(abs(distance) < task.reach for distance in distances):
+    if not all(abs(distance) < problem.reach for distance in distances):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
-    course: Course = RestToRest(task=task, start=start, final=final, distances=distances)
+    trajectory: ReferenceTrajectory = RestToRestTrajectory(
+        problem=problem, start=start, final=final, distances=distances
+    )
     moves = any(distances)
-    boundary = task.unit.boundary_residual if moves else 0.0
-    optimality = task.unit.optimality_residual if moves else 0.0
+    boundary = problem.unit.boundary_residual if moves else 0.0
+    optimality = problem.unit.optimality_residual if moves else 0.0
     if options.strategy is Strategy.INSENSITIVE and distances[0]:
         if options.flat_model is not FlatModel.EXACT:
             raise InvalidRequest('strategy insensitive needs flat_model exact')
-        course, boundary, optimality = shaped_course(task, options.insensitivity, start, final)
+        trajectory, boundary, optimality = shaped_trajectory(
+            problem, options.insensitivity, start, final
+        )
     return Plan(
         request=request,
         options=options,
-        task=task,
-        course=course,
+        problem=problem,
+        trajectory=trajectory,
         boundary_residual=boundary,
         optimality_residual=optimality,
     )
 
 
 def _from_motion(
-    request: MotionRequest, options: PlanningOptions, task: Task, start: FloatArray
+    request: MotionRequest, options: PlanningOptions, problem: MotionProblem, start: FloatArray
 ) -> Plan:
     """Return a plan whose planned variables have given derivatives at the start."""
     if options.strategy is Strategy.INSENSITIVE:
-        # It has no law from a start in motion; the task's cost is the polynomial one.
+        # It has no law from a start in motion; the problem's cost is the polynomial one.
         options = replace(options, strategy=Strategy.POLYNOMIAL)
     final = np.array(planned_at_rest(request.final))
     with strict_arithmetic():
-        found = laws_to_rest(task, start, final)
+        found = laws_to_rest(problem, start, final)
     return Plan(
         request=request,
         options=options,
-        task=task,
-        course=FreeCourse(
-            task=task, laws=found.laws, start=start, final=final, edges=(0.0, task.duration)
+        problem=problem,
+        trajectory=LawTrajectory(
+            problem=problem,
+            laws=found.laws,
+            start=start,
+            final=final,
+            edges=(0.0, problem.duration),
         ),
         boundary_residual=found.boundary_residual,
         optimality_residual=found.optimality_residual,
     )
 
 
-def _through_points(request: MotionRequest, options: PlanningOptions, task: Task) -> Plan:
+def _through_points(
+    request: MotionRequest, options: PlanningOptions, problem: MotionProblem
+) -> Plan:
     """Return a plan whose flat outputs pass given values on the way."""
     if options.strategy is Strategy.INSENSITIVE:
         raise InvalidRequest('strategy insensitive has no via points; another strategy has')
-    path = path_of(request, task)
-    found = optimal_path(task.cost, path)
+    path = path_of(request, problem)
+    found = optimal_path(problem.cost, path)
     return Plan(
         request=request,
         options=options,
-        task=task,
-        course=FreeCourse(
-            task=task,
+        problem=problem,
+        trajectory=LawTrajectory(
+            problem=problem,
             laws=found.laws,
             start=path.start,
             final=path.values[:, -1],

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is asked of the planner: a motion that ends at rest, and what it minimises."""
+"""What is asked of the planner, a motion that ends at rest; what it minimises; its refusal."""
 
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from math import isfinite
 
-from flat_planner_ros.core.arm import FlatModel, FloatArray, InvalidRequest
+from flat_planner_ros.core.arm import FlatModel, FlatPlannerError, FloatArray, InvalidRequest
 from flat_planner_ros.core.insensitive import Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 import numpy as np
@@ -161,6 +162,73 @@ class PlanningOptions:
             custom = np.array(self.custom, dtype=float)
             custom.setflags(write=False)
             object.__setattr__(self, 'custom', custom)
+
+
+class Reason(Enum):
+    """Why a request is rejected; the names are those of the ROS interface."""
+
+    INVALID_GOAL = 'INVALID_GOAL'
+    INVALID_JOINTS = 'INVALID_JOINTS'
+    OLD_HEADER_TIMESTAMP = 'OLD_HEADER_TIMESTAMP'
+    EMPTY_GOAL = 'EMPTY_GOAL'
+    NON_FINITE = 'NON_FINITE'
+    SIZE_MISMATCH = 'SIZE_MISMATCH'
+    TIME_NOT_INCREASING = 'TIME_NOT_INCREASING'
+    NONZERO_END_STATE = 'NONZERO_END_STATE'
+    PASSIVE_JOINT_NOT_ZERO = 'PASSIVE_JOINT_NOT_ZERO'
+    EFFORT_NOT_ALLOWED = 'EFFORT_NOT_ALLOWED'
+    POSITION_LIMIT = 'POSITION_LIMIT'
+    VELOCITY_LIMIT = 'VELOCITY_LIMIT'
+    EFFORT_LIMIT = 'EFFORT_LIMIT'
+    DURATION_OUT_OF_RANGE = 'DURATION_OUT_OF_RANGE'
+    START_STATE_UNKNOWN = 'START_STATE_UNKNOWN'
+    START_STATE_STALE = 'START_STATE_STALE'
+    START_STATE_MISMATCH = 'START_STATE_MISMATCH'
+    NOT_AT_REST = 'NOT_AT_REST'
+    SOLVER_FAILED = 'SOLVER_FAILED'
+    ILL_CONDITIONED = 'ILL_CONDITIONED'
+    BUSY = 'BUSY'
+    INTERNAL = 'INTERNAL'
+
+
+class RequestRejected(FlatPlannerError):
+    """
+    A request that is answered with a refusal.
+
+    Attributes
+    ----------
+    reason
+        The rule that it breaks.
+    joint
+        The joint concerned, if one is.
+    value, limit
+        What was found and what is allowed, in SI units, where the rule has numbers.
+    time
+        Where in the motion [s], if it matters.
+    duration_min
+        Shortest duration that would be accepted, where that is the remedy [s].
+
+    """
+
+    def __init__(
+        self,
+        reason: Reason,
+        message: str,
+        *,
+        joint: str | None = None,
+        value: float | None = None,
+        limit: float | None = None,
+        time: float | None = None,
+        duration_min: float | None = None,
+    ) -> None:
+        """Keep the numbers apart from the sentence."""
+        super().__init__(message)
+        self.reason = reason
+        self.joint = joint
+        self.value = value
+        self.limit = limit
+        self.time = time
+        self.duration_min = duration_min
 
 
 def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from math import inf, isfinite, log, sqrt
 
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, OutOfReach, UncertifiedPlan
+from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
-from flat_planner_ros.core.planning.plan import Plan
 import numpy as np
 
 DURATION_TOLERANCE = 2e-4

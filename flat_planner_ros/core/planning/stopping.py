@@ -22,8 +22,8 @@ so that two laws tell where that is.
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law import CONDITIONS, costate
+from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.limits import JointLimits
-from flat_planner_ros.core.planning.plan import Plan
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
@@ -73,7 +73,7 @@ def stop_plan(
         Of the joints, if there are any.
 
     """
-    arm, options = running.task.arm, running.options
+    arm, options = running.problem.arm, running.options
     if jets is None:
         request = MotionRequest(start=pose, final=pose, duration=min(remaining, REST_DURATION))
         return plan(request, arm, options)
@@ -110,7 +110,7 @@ def _stop(
     duration: float,
 ) -> Plan:
     """Return the plan to rest of a given duration that costs least."""
-    arm = running.task.arm
+    arm = running.problem.arm
     first, second = (
         plan(
             MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets),
@@ -127,10 +127,13 @@ def _stop(
 
 def _end_costates(planned: Plan) -> FloatArray:
     """Return the costate of each planned variable at the end, shape (n - 1,)."""
-    coefficients = planned.cost.characteristic()
+    coefficients = planned.problem.cost.characteristic()
     end = np.array([planned.duration])
     return np.array(
-        [costate(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0] for law in planned.laws]
+        [
+            costate(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0]
+            for law in planned.trajectory.laws
+        ]
     )
 
 

@@ -30,8 +30,7 @@ from flat_planner_ros.core.insensitive import (
     Shaper,
 )
 from flat_planner_ros.core.motion_law import Strategy
-from flat_planner_ros.core.planning.plan import Plan
-from flat_planner_ros.core.planning.plan_samples import PlanSamples
+from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
@@ -118,8 +117,8 @@ def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> Predi
     if planned.request.start_jets is not None:
         start = (float(samples.positions[0, -1]), float(samples.velocities[0, -1]))
     return predict_residual(
-        planned.task.arm,
-        samples.torque,
+        planned.problem.arm,
+        samples.driving_effort,
         planned.duration,
         planned.options.insensitivity.box,
         start,
@@ -146,7 +145,9 @@ def duration_advice(planned: Plan, residual: PredictedResidual) -> str | None:
     for stretch in sorted(STRETCHES, reverse=True):
         duration = stretch * request.duration
         try:
-            longer = plan(replace(request, duration=duration), planned.task.arm, planned.options)
+            longer = plan(
+                replace(request, duration=duration), planned.problem.arm, planned.options
+            )
         except FlatPlannerError:
             return line
         left = residual_of_plan(longer, longer.sample(duration / ADVICE_INTERVALS))
@@ -166,7 +167,7 @@ def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:
     Those that need more time than there is are left out; so are all for an arm that does not
     oscillate, and for motions that do not start at rest.
     """
-    request, arm = planned.request, planned.task.arm
+    request, arm = planned.request, planned.problem.arm
     if request.via or request.start_jets is not None:
         return ()
     options = replace(planned.options, strategy=Strategy.POLYNOMIAL)
@@ -272,8 +273,8 @@ def _point(series: str, planned: Plan, weight: float = 0.0) -> TradeoffPoint:
         series=series,
         duration=planned.duration,
         weight=weight,
-        rms_effort=_rms(samples.torque),
-        peak_effort=float(np.abs(samples.torque).max()),
+        rms_effort=_rms(samples.driving_effort),
+        peak_effort=float(np.abs(samples.driving_effort).max()),
         nominal=residual.nominal,
         worst=residual.worst,
     )

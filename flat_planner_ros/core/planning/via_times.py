@@ -31,13 +31,13 @@ from flat_planner_ros.core.motion_law import (
     PathConditions,
     QuadraticCost,
 )
+from flat_planner_ros.core.planning.problem import MotionProblem, problem_of
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,
     PlanningOptions,
     ViaPoint,
 )
-from flat_planner_ros.core.planning.task import Task, task_of
 import numpy as np
 
 LEAST_SHARE = 0.05
@@ -99,7 +99,7 @@ def allocate_times(cost: QuadraticCost, path: PathConditions) -> FloatArray:
     return _edges(found.x, duration)
 
 
-def path_of(request: MotionRequest, task: Task) -> PathConditions:
+def path_of(request: MotionRequest, problem: MotionProblem) -> PathConditions:
     """Return what the planned variables of a motion go through."""
     final = np.array(planned_at_rest(request.final))
     start = request.start_jets
@@ -108,7 +108,7 @@ def path_of(request: MotionRequest, task: Task) -> PathConditions:
         start[:, 0] = planned_at_rest(request.start)
     relaxations = np.zeros(len(final))
     # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
-    relaxations[0] = task.flat_map.relaxation
+    relaxations[0] = problem.flat_map.relaxation
     return PathConditions(
         edges=np.array([0.0, *(point.time for point in request.via), request.duration]),
         start=start,
@@ -138,8 +138,8 @@ def with_via_times(
 
     """
     try:
-        task = task_of(arm, options, request.duration)
-        edges = allocate_times(task.cost, path_of(request, task))
+        problem = problem_of(arm, options, request.duration)
+        edges = allocate_times(problem.cost, path_of(request, problem))
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, 0.0) from error
     via = tuple(

@@ -64,17 +64,17 @@ def answer(
     arm, options = settings.arm, settings.options
     if origin.jets is not None and origin.before is not None:
         # What the arm is planned to do then is said in terms of the model it was planned with.
-        arm = origin.before.plan.task.arm
+        arm = origin.before.plan.problem.arm
         options = replace(options, flat_model=origin.before.plan.options.flat_model)
 
-    timing = settings.timing(origin.pose)
-    timing.check_pose('the start', origin.pose)
+    rules = settings.duration_rules(origin.pose)
+    rules.check_pose('the start', origin.pose)
     for index, point in enumerate(target.via):
-        timing.check_pose(f'via point {index}', np.array(point.positions))
-    timing.check_pose('the final', np.array(target.positions))
+        rules.check_pose(f'via point {index}', np.array(point.positions))
+    rules.check_pose('the final', np.array(target.positions))
 
     def timed(request: MotionRequest) -> TimedPlan:
-        return timing.timed(lambda time: plan(request.stretched(time), arm, options), duration)
+        return rules.timed(lambda time: plan(request.stretched(time), arm, options), duration)
 
     request = _request(target, origin, duration or NOMINAL_DURATION)
     try:

@@ -174,7 +174,7 @@ class PlannerSession:
             raise RequestRejected(
                 Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
             )
-        limits = self.settings.timing(origin.pose).limits
+        limits = self.settings.duration_rules(origin.pose).limits
         remaining = running.end - origin.time
         planned = stop_plan(running.plan, origin.pose, origin.jets, remaining, limits)
         motion = Motion(

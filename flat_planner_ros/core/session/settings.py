@@ -20,12 +20,12 @@ from math import inf
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.planning import (
+    DurationRules,
     JointLimits,
     OnViolation,
     PlanningOptions,
     Reason,
     RequestRejected,
-    Timing,
 )
 
 LONGEST_FOUND = 3600.0
@@ -177,7 +177,7 @@ class SessionSettings:
             )
         return duration
 
-    def timing(self, start: FloatArray) -> Timing:
+    def duration_rules(self, start: FloatArray) -> DurationRules:
         """
         Return the rules for the duration of a motion.
 
@@ -188,7 +188,7 @@ class SessionSettings:
 
         """
         limits = self.limits or JointLimits.of(self.arm.n)
-        return Timing(
+        return DurationRules(
             joints=self.joints,
             limits=limits.reaching(start, self.position_tolerance),
             on_violation=self.on_violation,

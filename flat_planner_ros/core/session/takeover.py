@@ -92,7 +92,7 @@ def takeover(timeline: Timeline, stamp: float | None, soonest: float) -> Origin:
     return Origin(
         time,
         before.plan.at(times).positions[0],
-        before.plan.jets(times)[:, :CONDITIONS, 0],
+        before.plan.trajectory.jets(times)[:, :CONDITIONS, 0],
         before,
     )
 

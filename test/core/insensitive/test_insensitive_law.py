@@ -76,7 +76,7 @@ def planned(duration=1.0, arm=ARM, final=(np.pi, 0.0), **wanted):
     request = MotionRequest(start=np.zeros(arm.n), final=np.array(final), duration=duration)
     options = PlanningOptions(strategy=Strategy.INSENSITIVE, insensitivity=Insensitivity(**wanted))
     result = plan(request, arm, options)
-    torque = result.sample(duration / 4000.0).torque
+    torque = result.sample(duration / 4000.0).driving_effort
     return result, predict_residual(arm, torque, duration, options.insensitivity.box)
 
 
@@ -182,7 +182,7 @@ def test_exact_and_the_front_exclude_each_other():
 def test_no_other_law_of_the_same_effort_is_clearly_better(nominal):
     duration, rng = 1.0, np.random.default_rng(1)
     result, left = planned(duration, nominal=nominal)
-    torque = result.sample(duration / 2000.0).torque
+    torque = result.sample(duration / 2000.0).driving_effort
     times = np.linspace(0.0, duration, len(torque))
     oscillator = Oscillator.of(ARM)
     factors = np.concatenate(BOX.edges(oscillator, duration))
@@ -222,7 +222,7 @@ def test_the_simulated_arm_swings_as_predicted(arm, final, factors, nominal):
     amplitude = envelope(other, motion.positions[-1, -1], motion.velocities[-1, -1])
     oscillator = Oscillator.of(arm)
     poles = oscillator.poles(np.array([factors]))
-    (predicted,) = residual_amplitude(oscillator, samples.torque, 1.0, poles)
+    (predicted,) = residual_amplitude(oscillator, samples.driving_effort, 1.0, poles)
     assert amplitude == pytest.approx(predicted, rel=1e-4, abs=1e-8)
     if factors == (1.0, 1.0) and nominal is Nominal.EXACT:
         assert amplitude < 1e-4
@@ -245,7 +245,7 @@ def test_the_last_sample_rests_at_the_goal(arm, nominal):
 def test_the_residual_is_of_second_order_where_it_is_weighed_most():
     def residual(share, **options):
         result = plan(request, ARM, PlanningOptions(**options))
-        torque = result.sample(1e-3).torque
+        torque = result.sample(1e-3).driving_effort
         place = oscillator.poles(np.array([[1.0 + share, 1.0], [1.0 - share, 1.0]]))
         return residual_amplitude(oscillator, torque, 1.5, place).max()
 
@@ -274,7 +274,7 @@ def test_more_weight_is_more_effort_and_less_residual(nominal, criterion):
 def test_any_duration(duration, nominal):
     result, left = planned(duration, nominal=nominal)
     polynomial = plan(result.request, ARM, PlanningOptions())
-    torque = polynomial.sample(duration / 4000.0).torque
+    torque = polynomial.sample(duration / 4000.0).driving_effort
     other = predict_residual(ARM, torque, duration, BOX)
     assert result.boundary_residual < 1e-9
     if duration >= 0.5:  # below, the polynomial law takes many times the effort
@@ -381,4 +381,4 @@ def test_in_motion_and_at_rest_something_is_planned():
     )
     assert plan(moving, ARM, options).sample(0.01).velocities[0, 0] == pytest.approx(0.1)
     resting = MotionRequest(start=np.zeros(2), final=np.zeros(2), duration=1.0)
-    assert not plan(resting, ARM, options).sample(0.01).torque.any()
+    assert not plan(resting, ARM, options).sample(0.01).driving_effort.any()

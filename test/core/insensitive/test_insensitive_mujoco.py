@@ -65,7 +65,7 @@ def played(samples, stiffness, damping):
     )
     compiled = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(compiled)
-    times, torque = samples.times, samples.torque
+    times, torque = samples.times, samples.driving_effort
     while data.time < times[-1] - 1e-9:
         # A step holds its effort: that of its middle keeps the second order.
         middle = data.time + 0.5 * PERIOD / SUBSTEPS
@@ -88,7 +88,7 @@ def test_mujoco_s_arm_swings_as_predicted(nominal, factors):
     amplitude = envelope(other, angles[1], rates[1])
     oscillator = Oscillator.of(ARM)
     poles = oscillator.poles(np.array([factors]))
-    (predicted,) = residual_amplitude(oscillator, samples.torque, 1.0, poles)
+    (predicted,) = residual_amplitude(oscillator, samples.driving_effort, 1.0, poles)
     assert amplitude == pytest.approx(predicted, rel=2e-3, abs=1e-6)
     assert amplitude <= residual_of_plan(result, samples).worst * 1.002 <= 0.0121
     assert abs(angles.sum() - np.pi) < 0.02

@@ -94,7 +94,7 @@ def random_motion_of_many_joints(rng, joints, moving):
     planned = plan(request, arm, options)
     if not moving:
         return planned
-    jets = planned.jets(np.array([0.4 * request.duration]))[:, :6, 0]
+    jets = planned.trajectory.jets(np.array([0.4 * request.duration]))[:, :6, 0]
     elsewhere = np.append(rng.uniform(-2.0, 2.0, joints - 1), 0.0)
     return plan(replace(request, final=elsewhere, start_jets=jets), arm, options)
 

@@ -108,8 +108,8 @@ def test_joint_motion_is_consistent(n):
     np.testing.assert_allclose(samples.flat[0, 0], samples.positions.sum(axis=1), atol=1e-14)
     for i in range(n - 2):
         np.testing.assert_array_equal(samples.flat[1 + i, 0], samples.positions[:, i])
-    np.testing.assert_allclose(found.jets(times), samples.planned, rtol=1e-15)
-    for law, jet in zip(found.laws, samples.planned, strict=True):
+    np.testing.assert_allclose(found.trajectory.jets(times), samples.planned, rtol=1e-15)
+    for law, jet in zip(found.trajectory.laws, samples.planned, strict=True):
         scale = np.abs(jet).max(axis=1, keepdims=True)
         assert (np.abs(law.jet(times, 6) - jet) <= 1e-11 * scale).all()
         assert law.duration == found.duration == 1.5
@@ -118,7 +118,7 @@ def test_joint_motion_is_consistent(n):
 @pytest.mark.parametrize('n', SIZES)
 def test_planned_variables_move_in_synchrony(n):
     request = request_of(n)
-    jets = plan(request, arm_of(n), options_of()).jets(np.linspace(0.0, 1.5, 50))
+    jets = plan(request, arm_of(n), options_of()).trajectory.jets(np.linspace(0.0, 1.5, 50))
     way = np.append(request.final.sum() - request.start.sum(), (request.final - request.start))
     unit = jets[0] / way[0]
     unit[0] = (jets[0, 0] - request.start.sum()) / way[0]
@@ -169,8 +169,8 @@ def test_cost_is_the_sum_over_the_planned_variables():
     found = plan(request, arm, options_of())
     x, w = np.polynomial.legendre.leggauss(12)
     times = (1.5 / 200 * (np.arange(200)[:, None] + 0.5 * (x + 1.0))).ravel()
-    jets = found.jets(times)[:, 1:]
-    density = np.einsum('vim,ij,vjm->m', jets, found.cost.matrix, jets)
+    jets = found.trajectory.jets(times)[:, 1:]
+    density = np.einsum('vim,ij,vjm->m', jets, found.problem.cost.matrix, jets)
     assert found.cost_value == pytest.approx(1.5 / 200 * np.tile(0.5 * w, 200) @ density, rel=1e-9)
 
 

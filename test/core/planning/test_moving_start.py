@@ -20,8 +20,7 @@ from core.conftest import ELBOW
 from flat_planner_ros.core.arm.errors import UncertifiedPlan
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions
-from flat_planner_ros.core.planning import moving_start
-from flat_planner_ros.core.planning import plan as certified_plan
+from flat_planner_ros.core.planning import certified_plan, moving_start
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
@@ -63,7 +62,7 @@ def test_ends_are_met(arm, name, duration):
     found = plan(request_from(jets, duration), arm, STRATEGIES[name])
     assert 0.0 < found.boundary_residual <= 1e-9
     assert found.optimality_residual <= 1e-9
-    for law, start, end in zip(found.laws, jets, FINAL, strict=True):
+    for law, start, end in zip(found.trajectory.laws, jets, FINAL, strict=True):
         ends = law.jet(np.array([0.0, duration]), 6)
         size = np.abs(law.jet(np.linspace(0.0, duration, 999), 6)).max(axis=1)
         assert (np.abs(ends[:6, 0] - start) <= 1e-9 * size[:6]).all()
@@ -74,7 +73,7 @@ def test_ends_are_met(arm, name, duration):
     np.testing.assert_array_equal(samples.planned[:, 1:6, -1], 0.0)
     for table in (samples.velocities, samples.accelerations, samples.efforts):
         np.testing.assert_array_equal(table[-1], 0.0)
-    clipped = found.jets(np.array([-3.0, duration + 3.0]))
+    clipped = found.trajectory.jets(np.array([-3.0, duration + 3.0]))
     np.testing.assert_array_equal(clipped[:, :6, 0], jets)
     np.testing.assert_array_equal(clipped[:, 0, 1], FINAL)
 
@@ -85,8 +84,8 @@ def test_no_other_motion_with_these_ends_costs_less(arm, name):
     found = plan(request_from(random_jets(2)), arm, STRATEGIES[name])
     x, weights = np.polynomial.legendre.leggauss(150)
     times, weights = 0.5 * (x + 1.0), 0.5 * weights
-    derivatives = np.array([law.jet(times, 6)[1:] for law in found.laws])
-    cost = found.cost.matrix
+    derivatives = np.array([law.jet(times, 6)[1:] for law in found.trajectory.laws])
+    cost = found.problem.cost.matrix
     checked = 0
     for degree in range(6):
         bump = np.polynomial.Polynomial([1, 0, -1]) ** 6 * np.polynomial.Polynomial.basis(degree)
@@ -111,11 +110,11 @@ def test_the_rest_of_an_optimal_motion_is_optimal(arm, name, share):
         arm,
         STRATEGIES[name],
     )
-    jets = whole.jets(np.array([share]))[:, :6, 0]
+    jets = whole.trajectory.jets(np.array([share]))[:, :6, 0]
     rest = plan(request_from(jets, 1.0 - share), arm, STRATEGIES[name])
     times = np.linspace(0.0, 1.0 - share, 60)
-    expected, found = whole.jets(share + times), rest.jets(times)
-    scale = np.abs(whole.jets(np.linspace(0, 1, 300))).max(axis=2, keepdims=True)
+    expected, found = whole.trajectory.jets(share + times), rest.trajectory.jets(times)
+    scale = np.abs(whole.trajectory.jets(np.linspace(0, 1, 300))).max(axis=2, keepdims=True)
     # The seam's derivatives are rounded, and the fifth of them is felt most at the sixth.
     assert (np.abs(found - expected)[:, :6] <= 1e-9 * scale[:, :6]).all()
     assert rest.at(times).efforts == pytest.approx(
@@ -158,9 +157,9 @@ def test_a_distant_place_costs_no_digits(arm):
     other = plan(request, arm, STRATEGIES['mixed'])
     assert other.boundary_residual <= 1e-12
     times = np.linspace(0.0, 1.0, 30)
-    expected = one.jets(times)[:, 1:6]
+    expected = one.trajectory.jets(times)[:, 1:6]
     scale = np.abs(expected).max(axis=2, keepdims=True)
-    assert (np.abs(other.jets(times)[:, 1:6] - expected) <= 1e-7 * scale).all()
+    assert (np.abs(other.trajectory.jets(times)[:, 1:6] - expected) <= 1e-7 * scale).all()
 
 
 @pytest.mark.parametrize(

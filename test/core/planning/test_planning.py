@@ -14,24 +14,26 @@
 
 """Plans against multiple precision, reference numbers, dense sampling and the simulated arm."""
 
+from importlib import import_module
 import json
 from pathlib import Path
 
 from flat_planner_ros.core.arm.errors import InvalidCost, InvalidRequest, NotFlat, UncertifiedPlan
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
-from flat_planner_ros.core.motion_law import unit_motion
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremal
-from flat_planner_ros.core.planning import plan as certified_plan
+from flat_planner_ros.core.planning import certified_plan
 from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.problem import problem_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
-from flat_planner_ros.core.planning.task import task_of
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.rollout import rollout
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
+
+unit_motion = import_module('flat_planner_ros.core.motion_law.unit_motion')
 
 REFERENCE = json.loads(
     (Path(__file__).parents[2] / 'reference' / 'motion_laws.json').read_text('utf-8')
@@ -112,7 +114,7 @@ def test_reference_motion_laws(case):
         mixed(case['r'], case['p']),
     )
     times = np.array(case['s']) * duration
-    samples, jet = found.at(times), found.laws[0].jet(times, 6)
+    samples, jet = found.at(times), found.trajectory.laws[0].jet(times, 6)
     jet[0] -= 0.5
     for derivative, expected in zip(jet, case['y'], strict=True):
         assert_close(derivative, expected)
@@ -139,7 +141,7 @@ def test_each_strategy_wins_its_own_discipline(damping):
     score = {}
     for name in ('polynomial', 'effort', 'energy', 'mixed'):
         found = plan(half_turn(), paper_arm_with(damping), STRATEGIES[name])
-        jet = found.laws[0].jet(times, 6)
+        jet = found.trajectory.laws[0].jet(times, 6)
         score[name] = [weights @ jet[6] ** 2, found.rms_effort[0], weights @ jet[2] ** 2]
     jerk, effort, energy = np.array([score[n] for n in ('polynomial', 'effort', 'energy')]).T
     assert np.argmin(jerk) == 0
@@ -185,7 +187,9 @@ def test_random_motions_of_the_whole_range(oracle):
         times = fractions * duration
         expected = oracle.solve(roots, duration, start, end).jet(times, 6)
         peak = np.abs(expected).max(axis=1, keepdims=True)
-        worst = max(worst, float(np.max(np.abs(found.laws[0].jet(times, 6) - expected) / peak)))
+        worst = max(
+            worst, float(np.max(np.abs(found.trajectory.laws[0].jet(times, 6) - expected) / peak))
+        )
         samples = found.at(times[1:-1])
         coupling = last * (both - last) / stiffness
         terms = [
@@ -229,8 +233,8 @@ def test_a_plan_states_what_it_was_asked(name, paper_arm):
 def test_cost_value_is_the_integral(name, paper_arm):
     found = plan(half_turn(), paper_arm, STRATEGIES[name])
     times, weights = gauss(1.0)
-    jet = found.laws[0].jet(times, 6)[1:]
-    density = np.einsum('im,ij,jm->m', jet, found.cost.matrix, jet)
+    jet = found.trajectory.laws[0].jet(times, 6)[1:]
+    density = np.einsum('im,ij,jm->m', jet, found.problem.cost.matrix, jet)
     assert found.cost_value == pytest.approx(weights @ density, rel=1e-9)
 
 
@@ -256,7 +260,7 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, const
 def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
     """A law for other ends misses the boundary, one for another cost the optimality."""
     compute = unit_motion.unit_modes
-    # A task that no other test has: nothing of it is in the cache.
+    # A problem that no other test has: nothing of it is in the cache.
     arm = paper_arm_with(2e-5)
 
     def wrong(coefficients):
@@ -291,10 +295,10 @@ def test_costs_of_long_motions_do_not_overflow(paper_arm, duration, weight):
             continue
         options = PlanningOptions(strategy=name, r=weight, p=weight)
         with np.errstate(all='raise', under='ignore'):
-            task = task_of(paper_arm, options, duration)
-        assert 0.0 < task.reach < np.inf
+            problem = problem_of(paper_arm, options, duration)
+        assert 0.0 < problem.reach < np.inf
         if weight == 0.0:
-            assert task.cost_value < 1e-8
+            assert problem.cost_value < 1e-8
 
 
 def test_lost_roots_are_a_refusal():
@@ -481,16 +485,16 @@ def test_an_even_grid_is_the_law_at_its_times(name, paper_arm):
         samples = found.sample(duration / intervals)
         assert len(samples.times) == intervals + 1
         expected = found.at(samples.times)
-        for table in ('planned', 'torque', 'flat', 'positions', 'efforts'):
+        for table in ('planned', 'driving_effort', 'flat', 'positions', 'efforts'):
             one, other = getattr(samples, table), getattr(expected, table)
-            axis = -1 if table in ('planned', 'torque', 'flat') else 0
+            axis = -1 if table in ('planned', 'driving_effort', 'flat') else 0
             scale = np.abs(other).max(axis=axis, keepdims=True)
             assert (np.abs(one - other) <= 1e-11 * scale).all()
 
 
 def test_samples_are_locked(paper_arm):
     samples = plan(half_turn(), paper_arm, STRATEGIES['mixed']).sample(0.1)
-    for table in ('times', 'planned', 'torque', 'positions', 'efforts', 'flat'):
+    for table in ('times', 'planned', 'driving_effort', 'positions', 'efforts', 'flat'):
         with pytest.raises(ValueError, match='read-only'):
             getattr(samples, table)[...] = 0.0
 
@@ -509,9 +513,9 @@ def test_another_distance_and_a_scaled_arm_share_a_unit_motion():
         )
         request = MotionRequest(start=[0.3, 0.0], final=[0.8, 0.0], duration=1.0)
         other = plan(request, arm, options)
-        shared += other.task.unit is one.task.unit
-        expected = scale * 0.5 / np.pi * one.sample(0.01).torque
-        assert_close(other.sample(0.01).torque, expected)
+        shared += other.problem.unit is one.problem.unit
+        expected = scale * 0.5 / np.pi * one.sample(0.01).driving_effort
+        assert_close(other.sample(0.01).driving_effort, expected)
     assert shared >= 5
 
 

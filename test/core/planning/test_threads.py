@@ -15,17 +15,19 @@
 """Plans made by several threads at once, whose caches they share."""
 
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 import sys
 from threading import Barrier
 
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
-from flat_planner_ros.core.motion_law import unit_motion
 from flat_planner_ros.core.motion_law.cost import Strategy
-from flat_planner_ros.core.planning import task
+from flat_planner_ros.core.planning import problem
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
 import pytest
+
+unit_motion = import_module('flat_planner_ros.core.motion_law.unit_motion')
 
 THREADS = 4
 
@@ -39,7 +41,7 @@ def results(arm, options, duration):
         request = MotionRequest(start=[0.1, 0.0], final=[0.1 + distance, 0.0], duration=duration)
         made = plan(request, arm, options)
         samples = made.sample(0.01 * duration)
-        found += [samples.planned, samples.torque, samples.positions, samples.flat]
+        found += [samples.planned, samples.driving_effort, samples.positions, samples.flat]
         found += [made.rms_effort, made.peak_effort, made.cost_value, made.boundary_residual]
     return found
 
@@ -70,7 +72,7 @@ def test_plans_of_several_threads_are_the_same_as_of_one():
             duration = float(rng.uniform(0.5, 2.0))
             found = [pool.submit(together, arm, options, duration) for _ in range(THREADS)]
             # Alone, and nothing known.
-            task.task_of.cache_clear()
+            problem.problem_of.cache_clear()
             unit_motion.kept_units.cache_clear()
             expected = results(arm, options, duration)
             for each in found:

@@ -162,13 +162,13 @@ def test_no_motion_is_divided_evenly(arm):
 def test_a_start_in_motion(arm):
     options = STRATEGIES['effort']
     first = plan(REQUEST, arm, options)
-    jets = first.jets(np.array([0.7]))[:, :6, 0]
+    jets = first.trajectory.jets(np.array([0.7]))[:, :6, 0]
     rest = tuple(replace(point, time=point.time - 0.7) for point in REQUEST.via[1:])
     again = plan(replace(REQUEST, duration=1.3, via=rest, start_jets=jets), arm, options)
     times = np.linspace(0.0, 1.3, 100)
-    expected = first.jets(0.7 + times)
+    expected = first.trajectory.jets(0.7 + times)
     peaks = np.abs(expected).max(axis=2, keepdims=True)
-    assert (np.abs(again.jets(times) - expected) <= 1e-9 * peaks).all()
+    assert (np.abs(again.trajectory.jets(times) - expected) <= 1e-9 * peaks).all()
 
 
 def test_points_too_close_in_time_are_refused(arm):

@@ -18,7 +18,7 @@ from dataclasses import replace
 from itertools import pairwise
 from math import inf, nan, pi
 
-from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
+from flat_planner_ros.core.planning.request import Reason, RequestRejected
 from flat_planner_ros.core.session.goal import Goal, GoalPoint, MAX_ANGLE, MAX_POINTS, rest_target
 from hypothesis import given
 from hypothesis import strategies as st

@@ -22,11 +22,10 @@ from flat_planner_ros.core.arm.errors import InvalidRequest
 from flat_planner_ros.core.arm.joint_sample import JointSample
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
+from flat_planner_ros.core.planning.duration_rules import OnViolation
 from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import plan
-from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
-from flat_planner_ros.core.planning.request import PlanningOptions
-from flat_planner_ros.core.planning.timing import OnViolation
+from flat_planner_ros.core.planning.request import PlanningOptions, Reason, RequestRejected
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import SimulatedArm
 from flat_planner_ros.core.session.goal import Goal, GoalPoint
@@ -607,7 +606,7 @@ def test_contradictory_settings_are_refused(changes):
 
 
 def test_a_request_beyond_double_precision_is_ill_conditioned(monkeypatch):
-    monkeypatch.setattr('flat_planner_ros.core.planning.plan.BOUNDARY_TOLERANCE', 0.0)
+    monkeypatch.setattr('flat_planner_ros.core.planning.certified_plan.BOUNDARY_TOLERANCE', 0.0)
     error = reason_of(session().submit, GOAL, NOW)
     assert error.reason is Reason.ILL_CONDITIONED
     assert error.value > 0.0

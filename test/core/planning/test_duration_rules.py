@@ -20,12 +20,16 @@ from math import inf, pi
 from flat_planner_ros.core.arm.joint_sample import JointSample
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
+from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import extrema_of, Quantity
 from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import plan
-from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
-from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
-from flat_planner_ros.core.planning.timing import OnViolation, Timing
+from flat_planner_ros.core.planning.request import (
+    MotionRequest,
+    PlanningOptions,
+    Reason,
+    RequestRejected,
+)
 from flat_planner_ros.core.session.goal import Goal, GoalPoint
 from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import SessionSettings
@@ -51,7 +55,7 @@ LOADED = PlanarArm.reduced(
 
 def timing(limits, on_violation=OnViolation.REJECT, joints=('shoulder', 'elbow'), **changes):
     """Return rules."""
-    return Timing(
+    return DurationRules(
         joints=joints,
         limits=limits,
         on_violation=on_violation,

@@ -12,19 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Plan: a motion to rest that certifies itself."""
+"""A motion to rest that certifies itself, and its samples, each formed when asked for."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law import QuadraticCost
-from flat_planner_ros.core.planning.course import Course, Law, RestToRest
-from flat_planner_ros.core.planning.plan_samples import PlanSamples
+from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, PlanarArm, UncertifiedPlan
+from flat_planner_ros.core.planning.problem import even_times, MotionProblem
+from flat_planner_ros.core.planning.reference_trajectory import (
+    ReferenceTrajectory,
+    RestToRestTrajectory,
+)
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
-from flat_planner_ros.core.planning.task import even_times, Task
 import numpy as np
 
 BOUNDARY_TOLERANCE = 1e-9
@@ -35,6 +36,104 @@ OPTIMALITY_TOLERANCE = 1e-9
 
 SPACING_TOLERANCE = 1e-9
 """Excess of a grid's spacing over the period that is forgiven as roundoff [-]."""
+
+FLAT_ORDERS = 6
+"""Derivatives of the flat outputs in a plan, the values included."""
+
+JOINT_ORDERS = 3
+"""Position, velocity and acceleration."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanSamples:
+    """
+    A plan on a grid of times.
+
+    Attributes
+    ----------
+    times
+        From the start of the motion, shape (m,) [s].
+    planned
+        Derivatives 0 to 6 of the planned variables w, shape (n - 1, 7, m) [rad/s^k].
+    driving_effort
+        Effort of joint n-1, which drives the passive one, without friction, shape (m,) [N m].
+    arm, flat_map
+        From these to everything below.
+    compensates_friction
+        Whether the efforts include what friction takes.
+
+    """
+
+    times: FloatArray
+    planned: FloatArray
+    driving_effort: FloatArray
+    arm: PlanarArm
+    flat_map: FlatMap
+    compensates_friction: bool = False
+
+    def __post_init__(self) -> None:
+        """Lock the tables."""
+        self.times.setflags(write=False)
+        self.planned.setflags(write=False)
+        self.driving_effort.setflags(write=False)
+
+    @property
+    def positions(self) -> FloatArray:
+        """Angles of all joints, shape (m, n) [rad]."""
+        return self._joints[0]
+
+    @property
+    def velocities(self) -> FloatArray:
+        """First derivatives of the positions, shape (m, n) [rad/s]."""
+        return self._joints[1]
+
+    @property
+    def accelerations(self) -> FloatArray:
+        """Second derivatives of the positions, shape (m, n) [rad/s^2]."""
+        return self._joints[2]
+
+    @cached_property
+    def efforts(self) -> FloatArray:
+        """
+        Feed-forward effort of all joints, zero for the passive one, shape (m, n) [N m].
+
+        Joint n-1 follows from the flat map ((13) of docs/derivation.md), those before it from the
+        inverse dynamics of the arm.
+        """
+        n = self.arm.n
+        efforts = np.zeros((len(self.times), n))
+        efforts[:, n - 2] = self.driving_effort
+        if n > 2:
+            efforts[:, : n - 2] = self.arm.rigid_effort(*self._joints)[:, : n - 2]
+        if self.compensates_friction:
+            efforts[:, :-1] += self.arm.friction(self.velocities)
+        efforts.setflags(write=False)
+        return efforts
+
+    @cached_property
+    def flat(self) -> FloatArray:
+        """Return derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k]."""
+        flat = _derivatives(self.flat_map.output, self.planned[0], FLAT_ORDERS)[None]
+        if len(self.planned) > 1:
+            flat = np.concatenate([flat, self.planned[1:, :FLAT_ORDERS]])
+        flat.setflags(write=False)
+        return flat
+
+    @cached_property
+    def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return positions, velocities and accelerations."""
+        n = self.arm.n
+        passive = _derivatives(self.flat_map.deflection, self.planned[0], JOINT_ORDERS)
+        joints = np.empty((JOINT_ORDERS, len(self.times), n))
+        # y1 is the angle of the last link, the sum of all joints'.
+        inner = np.subtract(self.flat[0, :JOINT_ORDERS], passive, out=joints[:, :, n - 2])
+        for i in range(n - 2):
+            joints[:, :, i] = self.planned[1 + i, :JOINT_ORDERS]
+            inner -= joints[:, :, i]
+        joints[:, :, n - 1] = passive
+        joints.setflags(write=False)
+        positions, velocities, accelerations = joints
+        return positions, velocities, accelerations
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,9 +148,9 @@ class Plan:
     options
         How it was planned: as asked for, but with the strategy polynomial in place of insensitive
         where the start is in motion.
-    task
+    problem
         What plans of the same arm, cost and duration share.
-    course
+    trajectory
         The planned variables over time.
     boundary_residual
         Largest miss at the ends, relative to each derivative's peak [-].
@@ -67,8 +166,8 @@ class Plan:
 
     request: MotionRequest
     options: PlanningOptions
-    task: Task
-    course: Course
+    problem: MotionProblem
+    trajectory: ReferenceTrajectory
     boundary_residual: float
     optimality_residual: float
 
@@ -83,41 +182,9 @@ class Plan:
         return self.request.duration
 
     @property
-    def cost(self) -> QuadraticCost:
-        """Return what was minimised."""
-        return self.task.cost
-
-    @property
     def cost_value(self) -> float:
         """Integral of Y^T Q Y over the motion, summed over the planned variables."""
-        return self.course.cost_value
-
-    @property
-    def flat_map(self) -> FlatMap:
-        """From the first planned variable to the last two joints."""
-        return self.task.flat_map
-
-    @property
-    def laws(self) -> tuple[Law, ...]:
-        """Return the planned variables over time, n - 1 of them."""
-        return self.course.laws
-
-    def jets(self, times: FloatArray) -> FloatArray:
-        """
-        Return the derivatives 0 to 6 of the planned variables.
-
-        Parameters
-        ----------
-        times
-            From the start of the motion, clipped to it, shape (m,) [s].
-
-        Returns
-        -------
-        FloatArray
-            Shape (n - 1, 7, m) [rad/s^k].
-
-        """
-        return self.course.jets(times)
+        return self.trajectory.cost_value
 
     def sample(self, period: float) -> PlanSamples:
         """
@@ -130,8 +197,9 @@ class Plan:
 
         """
         intervals = max(1, ceil(self.duration / period - SPACING_TOLERANCE))
-        planned, torque = self.course.on_even_grid(intervals)
-        return self._samples(even_times(self.duration, intervals), planned, torque)
+        return self._samples(
+            even_times(self.duration, intervals), *self.trajectory.on_even_grid(intervals)
+        )
 
     def at(self, times: FloatArray) -> PlanSamples:
         """
@@ -143,9 +211,9 @@ class Plan:
             From the start of the motion, clipped to it, shape (m,) [s].
 
         """
-        planned = self.jets(times)
-        torque = apply_row(self.flat_map.effort, planned[0])
-        return self._samples(np.array(times), planned, torque)
+        planned = self.trajectory.jets(times)
+        driving_effort = apply_row(self.problem.flat_map.effort, planned[0])
+        return self._samples(np.array(times), planned, driving_effort)
 
     @property
     def rms_effort(self) -> FloatArray:
@@ -171,20 +239,20 @@ class Plan:
         with Coulomb friction to 1e-4; peaks are those at the nodes, within 2e-3 of the true ones
         from below.
         """
-        course = self.course
+        trajectory = self.trajectory
         if (
-            isinstance(course, RestToRest)
-            and len(course.distances) == 1
+            isinstance(trajectory, RestToRestTrajectory)
+            and len(trajectory.distances) == 1
             and not self.options.compensate_friction
         ):
             # Linear in the unit motion, whose values at the nodes are known.
-            mean = self.task.unit.mean(course.distances[0] * self.task.rows)
+            mean = self.problem.unit.mean(trajectory.distances[0] * self.problem.rows)
             return _Figures(
                 np.append(np.sqrt(mean.mean_square[0]), 0.0),
                 np.append(mean.peak[0], 0.0),
                 mean.peak[1:],
             )
-        times, weights = course.quadrature()
+        times, weights = trajectory.quadrature()
         samples = self.at(times)
         return _Figures(
             np.sqrt(weights @ samples.efforts**2),
@@ -192,14 +260,16 @@ class Plan:
             np.abs(samples.velocities).max(axis=0),
         )
 
-    def _samples(self, times: FloatArray, planned: FloatArray, torque: FloatArray) -> PlanSamples:
+    def _samples(
+        self, times: FloatArray, planned: FloatArray, driving_effort: FloatArray
+    ) -> PlanSamples:
         """Return samples of this plan."""
         return PlanSamples(
             times=times,
             planned=planned,
-            torque=torque,
-            arm=self.task.arm,
-            flat_map=self.task.flat_map,
+            driving_effort=driving_effort,
+            arm=self.problem.arm,
+            flat_map=self.problem.flat_map,
             compensates_friction=self.options.compensate_friction,
         )
 
@@ -216,3 +286,11 @@ def _certify(quantity: str, residual: float, tolerance: float) -> None:
     """Refuse a residual above its tolerance, or none at all (NaN)."""
     if not residual <= tolerance:
         raise UncertifiedPlan(quantity, residual, tolerance)
+
+
+def _derivatives(row: FloatArray, jet: FloatArray, count: int) -> FloatArray:
+    """Return the quantity of a row and its derivatives, shape (count, m)."""
+    table = np.empty((count, jet.shape[1]))
+    for order, values in enumerate(table):
+        np.matmul(row, jet[order : order + len(row)], out=values)
+    return table

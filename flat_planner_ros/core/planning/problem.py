@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Task: all that plans of one arm, cost and duration have in common, computed once and kept."""
+"""Motion problem: what plans of one arm, cost and duration have in common, computed once."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -35,14 +35,14 @@ from numpy.typing import NDArray
 MAX_NUMBER = 1e300
 """Largest number in a plan; products with weights of order one still have room."""
 
-TASKS_KEPT = 64
+PROBLEMS_KEPT = 64
 """Combinations of arm, options and duration whose unit motion is remembered."""
 
 _ORDERS = np.arange(JET_ORDER + 1.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Task:
+class MotionProblem:
     """
     What a plan is made from, besides its ends: the motion over 1 rad.
 
@@ -94,11 +94,11 @@ class Task:
         return rows
 
     def grid(self, intervals: int) -> FloatArray:
-        """Return the derivatives 0 to 6 and the torque at even times, read-only, shape (8, m)."""
+        """Return derivatives 0 to 6 and driving effort at even times, read-only, shape (8, m)."""
         return (_grid if intervals > MAX_KEPT_INTERVALS else _kept_grid)(self, intervals)
 
     def fill_grid(self, table: FloatArray, distance: float) -> None:
-        """Write the derivatives 0 to 6 and the torque over a distance at even times, (8, m)."""
+        """Write derivatives 0 to 6 and driving effort over a distance at even times, (8, m)."""
         intervals = table.shape[1] - 1
         if intervals <= MAX_KEPT_INTERVALS:
             np.multiply(_kept_grid(self, intervals), distance, out=table)
@@ -106,8 +106,8 @@ class Task:
             _fill(self, table, distance)
 
 
-@lru_cache(maxsize=TASKS_KEPT)
-def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
+@lru_cache(maxsize=PROBLEMS_KEPT)
+def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> MotionProblem:
     """
     Return what plans of an arm have in common; arms and options count as equal if identical.
 
@@ -134,7 +134,7 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     # A law that is no minimum, which its certificate refuses, might have a negative cost.
     # Roots first: a cost of less than 1e-8 would take the quotient out of range.
     reach = min(MAX_NUMBER / largest, MAX_NUMBER**0.5 / cost_value**0.5) if cost_value > 0 else 0.0
-    return Task(
+    return MotionProblem(
         arm=arm,
         duration=duration,
         cost=cost,
@@ -146,18 +146,18 @@ def task_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Task:
     )
 
 
-def _grid(task: Task, intervals: int) -> FloatArray:
+def _grid(problem: MotionProblem, intervals: int) -> FloatArray:
     """Return the motion over 1 rad at even times."""
-    table = np.empty((len(task.rates) + 1, intervals + 1))
-    _fill(task, table, 1.0)
+    table = np.empty((len(problem.rates) + 1, intervals + 1))
+    _fill(problem, table, 1.0)
     table.setflags(write=False)
     return table
 
 
-def _fill(task: Task, table: FloatArray, distance: float) -> None:
+def _fill(problem: MotionProblem, table: FloatArray, distance: float) -> None:
     """Write the motion over a distance at even times."""
-    task.unit.fill_grid(table[:-1], distance * task.rates)
-    row = task.flat_map.effort
+    problem.unit.fill_grid(table[:-1], distance * problem.rates)
+    row = problem.flat_map.effort
     np.matmul(row, table[: len(row)], out=table[-1])
 
 

@@ -12,37 +12,40 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Course of an insensitive motion: the elastic end shaped, the other joints on smooth laws."""
+"""Insensitive motions: the elastic end shaped, the other joints on smooth laws."""
 
 from typing import NamedTuple
 
 from flat_planner_ros.core.insensitive import insensitive_motion, Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, ExponentialLaw
-from flat_planner_ros.core.planning.course import FreeCourse, Law
-from flat_planner_ros.core.planning.task import Task
+from flat_planner_ros.core.planning.problem import MotionProblem
+from flat_planner_ros.core.planning.reference_trajectory import Law, LawTrajectory
 import numpy as np
 
 
-class ShapedCourse(NamedTuple):
-    """A course and its certificate, residuals as those of a plan."""
+class ShapedTrajectory(NamedTuple):
+    """A trajectory and its certificate, residuals as those of a plan."""
 
-    course: FreeCourse
+    trajectory: LawTrajectory
     boundary_residual: float
     optimality_residual: float
 
 
-def shaped_course(
-    task: Task, wanted: Insensitivity, start: tuple[float, ...], final: tuple[float, ...]
-) -> ShapedCourse:
+def shaped_trajectory(
+    problem: MotionProblem,
+    wanted: Insensitivity,
+    start: tuple[float, ...],
+    final: tuple[float, ...],
+) -> ShapedTrajectory:
     """
     Return the insensitive motion from rest to rest.
 
     Only joint n-1 can excite or quiet the oscillation, and only the planned variable of the
-    elastic end tells its effort: the others move by the task's law, of the same duration.
+    elastic end tells its effort: the others move by the problem's law, of the same duration.
 
     Parameters
     ----------
-    task
+    problem
         The arm, the duration, and the law of the other planned variables.
     wanted
         Uncertainty and trade.
@@ -58,30 +61,30 @@ def shaped_course(
 
     """
     distance = final[0] - start[0]
-    shaped = insensitive_motion(task.arm, task.duration, wanted, distance)
+    shaped = insensitive_motion(problem.arm, problem.duration, wanted, distance)
     laws: list[Law] = [shaped.law.over(distance, 0.5 * (start[0] + final[0]))]
     for begin, end in zip(start[1:], final[1:], strict=True):
         laws.append(
             ExponentialLaw(
-                duration=task.duration,
-                modes=task.unit.law.modes,
+                duration=problem.duration,
+                modes=problem.unit.law.modes,
                 factor=end - begin,
                 offset=0.5 * (begin + end),
             )
         )
     rest = np.zeros((len(start), CONDITIONS))
     rest[:, 0] = start
-    course = FreeCourse(
-        task=task,
+    trajectory = LawTrajectory(
+        problem=problem,
         laws=tuple(laws),
         start=rest,
         final=np.array(final),
-        edges=(0.0, task.duration),
+        edges=(0.0, problem.duration),
         own_cost=shaped.cost,
     )
-    unit = task.unit
-    return ShapedCourse(
-        course,
+    unit = problem.unit
+    return ShapedTrajectory(
+        trajectory,
         max(unit.boundary_residual, shaped.boundary_residual),
         max(unit.optimality_residual, shaped.stationarity),
     )

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
-from flat_planner_ros.core.planning.plan import Plan
-from flat_planner_ros.core.planning.rejection import Reason, RequestRejected
+from flat_planner_ros.core.planning.request import Reason, RequestRejected
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
 
 REASONS = {
@@ -65,7 +65,7 @@ class TimedPlan:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Timing:
+class DurationRules:
     """
     Rules for durations.
 

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Course of a motion: the planned variables over time, however their laws were found.
+Reference trajectory of a motion: the planned variables over time, however their laws were found.
 
 From rest to rest all planned variables are multiples of one unit motion, which is cached with its
-samples; any other course is evaluated law by law.
+samples; any other trajectory is evaluated law by law.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ from flat_planner_ros.core.motion_law import (
     JET_ORDER,
     motion_quadrature,
 )
-from flat_planner_ros.core.planning.task import even_times, Task
+from flat_planner_ros.core.planning.problem import even_times, MotionProblem
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -47,13 +47,13 @@ class Law(Protocol):
 
 
 class Samples(NamedTuple):
-    """Derivatives 0 to 6 of the planned variables, (n - 1, 7, m), and torque (m,) [N m]."""
+    """Derivatives 0 to 6 of the planned variables, (n - 1, 7, m); driving effort (m,) [N m]."""
 
     planned: FloatArray
-    torque: FloatArray
+    driving_effort: FloatArray
 
 
-class Course(Protocol):
+class ReferenceTrajectory(Protocol):
     """The planned variables of a motion."""
 
     @property
@@ -72,20 +72,20 @@ class Course(Protocol):
         """Return the derivatives 0 to 6 at times clipped to the motion, shape (n - 1, 7, m)."""
 
     def on_even_grid(self, intervals: int) -> Samples:
-        """Return derivatives and torque at intervals + 1 even times."""
+        """Return derivatives and driving effort at intervals + 1 even times."""
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RestToRest:
+class RestToRestTrajectory:
     """
     Multiples of a unit motion.
 
     Attributes
     ----------
-    task
+    problem
         The motion over 1 rad.
     start, final
         Planned variables at both ends, n - 1 of them [rad].
@@ -94,7 +94,7 @@ class RestToRest:
 
     """
 
-    task: Task
+    problem: MotionProblem
     start: tuple[float, ...]
     final: tuple[float, ...]
     distances: tuple[float, ...]
@@ -104,8 +104,8 @@ class RestToRest:
         """Return the law of each planned variable."""
         return tuple(
             ExponentialLaw(
-                duration=self.task.duration,
-                modes=self.task.unit.law.modes,
+                duration=self.problem.duration,
+                modes=self.problem.unit.law.modes,
                 factor=distance,
                 offset=0.5 * (start + final),
             )
@@ -115,20 +115,20 @@ class RestToRest:
     @property
     def edges(self) -> tuple[float, ...]:
         """Return start and end of the motion [s]."""
-        return 0.0, self.task.duration
+        return 0.0, self.problem.duration
 
     @property
     def cost_value(self) -> float:
         """Return the sum of the costs."""
-        return sum(distance**2 for distance in self.distances) * self.task.cost_value
+        return sum(distance**2 for distance in self.distances) * self.problem.cost_value
 
     def jets(self, times: FloatArray) -> FloatArray:
         """Return the derivatives 0 to 6 at times clipped to the motion, shape (n - 1, 7, m)."""
-        task, duration = self.task, self.task.duration
+        problem, duration = self.problem, self.problem.duration
         clipped = np.clip(times, 0.0, duration)
         rate = 2.0 / duration
-        unit = task.unit.jet(rate * clipped, rate * (duration - clipped))
-        planned: FloatArray = unit * np.multiply.outer(self.distances, task.rates)[..., None]
+        unit = problem.unit.jet(rate * clipped, rate * (duration - clipped))
+        planned: FloatArray = unit * np.multiply.outer(self.distances, problem.rates)[..., None]
         planned[:, 0] += 0.5 * (np.array(self.start) + np.array(self.final))[:, None]
         # The certified ends take their exact values: an executor compares them with zero.
         for reached, end in ((clipped <= 0.0, self.start), (clipped >= duration, self.final)):
@@ -137,14 +137,14 @@ class RestToRest:
         return planned
 
     def on_even_grid(self, intervals: int) -> Samples:
-        """Return derivatives and torque at intervals + 1 even times."""
-        task, distances = self.task, self.distances
-        table = np.empty((len(distances), len(task.rates) + 1, intervals + 1))
-        unit = task.grid(intervals) if len(distances) > 1 else None
+        """Return derivatives and driving effort at intervals + 1 even times."""
+        problem, distances = self.problem, self.distances
+        table = np.empty((len(distances), len(problem.rates) + 1, intervals + 1))
+        unit = problem.grid(intervals) if len(distances) > 1 else None
         for i, distance in enumerate(distances):
             part, start, final = table[i], self.start[i], self.final[i]
             if unit is None:
-                task.fill_grid(part, distance)
+                problem.fill_grid(part, distance)
             else:
                 np.multiply(unit, distance, out=part)
             values = part[0]
@@ -155,17 +155,17 @@ class RestToRest:
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
         travel = sum(abs(distance) for distance in self.distances)
-        return motion_quadrature(self.task.rates_of_modes, travel, self.edges)
+        return motion_quadrature(self.problem.rates_of_modes, travel, self.edges)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FreeCourse:
+class LawTrajectory:
     """
-    Laws of any kind that solve the task's equation between given times.
+    Laws of any kind that solve the problem's equation between given times.
 
     Attributes
     ----------
-    task
+    problem
         Cost and equation that they share.
     laws
         One for each planned variable, n - 1 of them.
@@ -176,11 +176,11 @@ class FreeCourse:
     edges
         Times from the start to the end between which the laws are smooth [s].
     own_cost
-        Of laws that minimise something other than the task's cost; None for the latter.
+        Of laws that minimise something other than the problem's cost; None for the latter.
 
     """
 
-    task: Task
+    problem: MotionProblem
     laws: tuple[Law, ...]
     start: FloatArray
     final: FloatArray
@@ -194,12 +194,12 @@ class FreeCourse:
             return self.own_cost
         times, weights = self.quadrature()
         derivatives = self.jets(times)[:, 1:]
-        density = np.einsum('vim,ij,vjm->m', derivatives, self.task.cost.matrix, derivatives)
-        return float(self.task.duration * (weights @ density))
+        density = np.einsum('vim,ij,vjm->m', derivatives, self.problem.cost.matrix, derivatives)
+        return float(self.problem.duration * (weights @ density))
 
     def jets(self, times: FloatArray) -> FloatArray:
         """Return the derivatives 0 to 6 at times clipped to the motion, shape (n - 1, 7, m)."""
-        duration = self.task.duration
+        duration = self.problem.duration
         clipped = np.clip(times, 0.0, duration)
         planned = np.array([law.jet(clipped, JET_ORDER) for law in self.laws])
         # The certified ends take their exact values, as those of a motion from rest do.
@@ -210,12 +210,12 @@ class FreeCourse:
         return planned
 
     def on_even_grid(self, intervals: int) -> Samples:
-        """Return derivatives and torque at intervals + 1 even times."""
-        planned = self.jets(even_times(self.task.duration, intervals))
-        return Samples(planned, apply_row(self.task.flat_map.effort, planned[0]))
+        """Return derivatives and driving effort at intervals + 1 even times."""
+        planned = self.jets(even_times(self.problem.duration, intervals))
+        return Samples(planned, apply_row(self.problem.flat_map.effort, planned[0]))
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
         places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
         travel = float(np.abs(np.diff(places)).sum())
-        return motion_quadrature(self.task.rates_of_modes, travel, self.edges)
+        return motion_quadrature(self.problem.rates_of_modes, travel, self.edges)

@@ -209,7 +209,7 @@ def test_what_obeys_at_once_takes_the_shortest_duration_allowed(paper_arm):
 
 def test_a_motion_that_has_begun_obeys_too(paper_arm):
     motion = motions(paper_arm, [pi, 0.0])
-    jets = motion(1.0).jets(np.array([0.4]))[:, :6, 0]
+    jets = motion(1.0).trajectory.jets(np.array([0.4]))[:, :6, 0]
     request = MotionRequest(start=[0.0, 0.0], final=[pi, 0.0], duration=1.0, start_jets=jets)
     limits = JointLimits.of(2, effort=[0.02, inf], velocity=[8.0, inf])
 
