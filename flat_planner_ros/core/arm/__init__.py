@@ -14,7 +14,7 @@
 
 """Arm: the model. Links, dynamics, counterbalances, flat map; its errors and measured samples."""
 
-from flat_planner_ros.core.arm.arrays import FloatArray
+from flat_planner_ros.core.arm.arrays import ComplexArray, FloatArray
 from flat_planner_ros.core.arm.counterbalance import (
     Counterbalances,
     counterbalances,
@@ -50,6 +50,7 @@ __all__ = [
     'ArmDescription',
     'bodies_of_constants',
     'bodies_of_links',
+    'ComplexArray',
     'ControlBlock',
     'Counterbalances',
     'counterbalances',

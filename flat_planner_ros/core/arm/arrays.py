@@ -23,6 +23,9 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 """Values in double precision, of any shape."""
 
+ComplexArray = npt.NDArray[np.complex128]
+"""The same for complex values."""
+
 
 def applied(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the product of a matrix (..., n, n) with each vector (..., n), shape (..., n)."""

@@ -14,38 +14,30 @@
 
 """Insensitivity: the residual on arms other than the model, and laws that keep it small."""
 
-from flat_planner_ros.core.insensitive.law import (
-    check_insensitivity,
-    insensitive_motion,
-    least_effort,
-)
-from flat_planner_ros.core.insensitive.residual import (
-    MAX_HALF_WIDTH,
-    predict_residual,
-    PredictedResidual,
-    UncertaintyBox,
-)
-from flat_planner_ros.core.insensitive.settings import (
+from flat_planner_ros.core.insensitive.insensitivity import (
     Criterion,
     DEFAULT_WEIGHT,
     Insensitivity,
+    MAX_HALF_WIDTH,
     MAX_INSENSITIVITY,
     Nominal,
+    UncertaintyBox,
 )
+from flat_planner_ros.core.insensitive.law import check_insensitivity, insensitive_motion
+from flat_planner_ros.core.insensitive.residual import predict_residual, PredictedResidual
 from flat_planner_ros.core.insensitive.shapers import shaped_quintic, Shaper
 
 __all__ = [
+    'check_insensitivity',
     'Criterion',
     'DEFAULT_WEIGHT',
+    'insensitive_motion',
     'Insensitivity',
-    'least_effort',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
     'Nominal',
     'predict_residual',
     'PredictedResidual',
-    'check_insensitivity',
-    'insensitive_motion',
     'shaped_quintic',
     'Shaper',
     'UncertaintyBox',

@@ -23,9 +23,9 @@ like an oscillator: w + delta w' + w'' / omega^2 = sigma.
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import ceil
+from math import ceil, sqrt
 
-from flat_planner_ros.core.arm import FlatMap, FloatArray
+from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, PlanarArm
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
@@ -54,6 +54,9 @@ in derivatives of sigma converges fast [rad].
 
 TERMS_PER_TURN = 1.4
 """Legendre terms that resolve one radian of half the turn, a little above e / 2 [1/rad]."""
+
+PROBES = 65
+"""Times at which a law is certified."""
 
 SPARE_TERMS = 20
 """Terms beyond those, after which the coefficients have decayed below roundoff."""
@@ -89,9 +92,34 @@ class MomentumBasis:
     torque_directions: FloatArray
     least: float
 
+    def changed(self, origin: FloatArray, directions: FloatArray) -> 'MomentumBasis':
+        """
+        Return the basis of a plane in this one.
+
+        Parameters
+        ----------
+        origin
+            Coefficients of its law of least effort, shape (modes,).
+        directions
+            Those of its changes, orthonormal and at right angles to the origin, (modes, fewer).
+
+        """
+        return MomentumBasis(
+            start=self.start + self.directions @ origin,
+            directions=self.directions @ directions,
+            torque_start=self.torque_start + self.torque_directions @ origin,
+            torque_directions=self.torque_directions @ directions,
+            least=self.least + float(origin @ origin),
+        )
+
 
 LEAST_OF_ALL = 1.5
 """Integral of sigma''^2 of a linear sigma'', the least of any motion from -1/2 to 1/2."""
+
+
+def least_effort(arm: PlanarArm, distance: float, duration: float) -> float:
+    """Return the least RMS effort of joint n-1 of any motion from rest to rest [N m], (I5)."""
+    return sqrt(12.0) * arm.inertia_star.both * abs(distance) / duration**2
 
 
 @lru_cache(maxsize=BASES_KEPT)
@@ -105,8 +133,8 @@ def momentum_basis(modes: int) -> MomentumBasis:
     start = np.zeros(size)
     fourth = legendre.legder(speed / (2.0 * speed[0]), CONTACT)
     start[: len(fourth)] = fourth
-    twice = integration(size + 2)
-    twice = (twice @ twice)[:, :size]
+    once = integration(size + 2)
+    twice = (once @ once)[:, :size]
     norm = np.sqrt(2.0 / (2.0 * np.arange(size + 2.0) + 1.0))
     orthonormal, triangle = np.linalg.qr(norm[:, None] * (twice @ changes))
     directions = np.linalg.solve(triangle.T, changes.T).T
@@ -205,7 +233,7 @@ class SeriesLaw:
         return result
 
 
-def answer(
+def response(
     fourth: FloatArray, torque: FloatArray, flat_map: FlatMap, duration: float
 ) -> SeriesLaw:
     """
@@ -272,3 +300,31 @@ def _split(torque: FloatArray, delta: float, epsilon: float, duration: float) ->
     value, growth = -(table[TOP] @ signs), -(table[TOP + 1] @ signs)
     amplitude = complex(value, (rate.real * value - growth) / rate.imag) / rate**TOP
     return SeriesLaw(duration=duration, table=table, rate=complex(rate), amplitude=amplitude)
+
+
+def largest_miss(
+    law: SeriesLaw, torque: FloatArray, mapping: FlatMap, *, rests_at_end: bool
+) -> float:
+    """Return the largest miss at the ends, and of the effort in between, relative to peaks."""
+    half = 0.5 * law.duration
+    times = np.linspace(0.0, law.duration, PROBES)
+    jet = law.jet(times, JET_ORDER)
+    both = mapping.effort[2]
+    # sigma and its derivatives from w, by the row that takes w to I sigma''.
+    sigma = np.array([apply_row(mapping.effort[2:] / both, jet, k) for k in range(CONTACT + 1)])
+    expected = legendre.legval(times / half - 1.0, torque) / half**2
+    effort = apply_row(mapping.effort, jet) / both
+    misses = [np.abs(effort - expected).max() / np.abs(expected).max()]
+    misses += [_end_miss(jet[:JET_ORDER], 0), _end_miss(sigma, -1)]
+    if rests_at_end:
+        misses.append(_end_miss(jet[:JET_ORDER], -1))
+    return float(max(misses))
+
+
+def _end_miss(table: FloatArray, end: int) -> float:
+    """Return how far derivatives at an end are from rest at -1/2 or 1/2, relative to peaks."""
+    rest = np.zeros(len(table))
+    rest[0] = 0.5 if end else -0.5
+    size = np.abs(table).max(axis=1)
+    size[0] += 0.5
+    return float((np.abs(table[:, end] - rest) / size).max())

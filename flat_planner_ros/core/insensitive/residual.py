@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Robustness: the oscillation that an effort leaves on an arm other than the planner's model.
+Residual: the oscillation that an effort leaves on an arm other than the planner's model.
 
 The residual amplitude is one integral of the effort against the arm's free oscillation ((44) of
 docs/derivation.md), so it is known before anything moves, for any stiffness and damping. Over a
@@ -24,14 +24,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.insensitive.insensitivity import UncertaintyBox
 import numpy as np
-from numpy.typing import NDArray
-
-ComplexArray = NDArray[np.complex128]
-
-MAX_HALF_WIDTH = 0.9
-"""Widest uncertainty of a parameter, as a share of its nominal value [-]."""
+from numpy.polynomial import legendre
 
 TURN_PER_POINT = 0.1
 """
@@ -47,70 +43,14 @@ MIN_POINTS = 5
 MAX_POINTS = 257
 """Most points of an edge."""
 
+MEAN_NODES = 4
+"""Gauss-Legendre nodes over either side of the box, plus one per radian of turn."""
+
+MAX_MEAN_NODES = 24
+"""Most of them."""
+
 BLOCK = 32
 """Effort samples per row of the table of exponentials."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class UncertaintyBox:
-    """
-    Range of the true stiffness and damping about the nominal ones.
-
-    Attributes
-    ----------
-    stiffness, damping
-        Half-widths as shares of the nominal values [-].
-
-    """
-
-    stiffness: float = 0.1
-    damping: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Refuse a box that reaches arms without a spring."""
-        for name in ('stiffness', 'damping'):
-            width = getattr(self, name)
-            if not 0.0 <= width <= MAX_HALF_WIDTH:
-                raise InvalidRequest(
-                    f'half-width of the {name} is {width:g}, outside [0, {MAX_HALF_WIDTH:g}]'
-                )
-
-    def edges(
-        self, mode: 'Oscillator', duration: float, most: int = MAX_POINTS
-    ) -> list[FloatArray]:
-        """
-        Return factors on stiffness and damping along the four edges.
-
-        Parameters
-        ----------
-        mode
-            The nominal arm.
-        duration
-            Time over which different arms drift apart [s].
-        most
-            Largest number of points of an edge.
-
-        Returns
-        -------
-        list[FloatArray]
-            Points from corner to corner, each of shape (m, 2) [-]; edges of no length are left
-            out.
-
-        """
-        k, c = self.stiffness, self.damping
-        low, high = np.array([1.0 - k, 1.0 - c]), np.array([1.0 + k, 1.0 + c])
-        corners = [low, np.array([high[0], low[1]]), high, np.array([low[0], high[1]])]
-        edges = []
-        for begin, end in zip(corners, [*corners[1:], corners[0]], strict=True):
-            if (begin == end).all():
-                continue
-            ends = mode.poles(np.array([begin, end]))
-            turn = duration * abs(ends[1] - ends[0])
-            count = min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most)
-            # Chebyshev points: extremes near corners are seen as well as those inside.
-            share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
-            edges.append(begin + share[:, None] * (end - begin))
-        return edges or [low[None]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +111,61 @@ class Oscillator:
             )
         poles: ComplexArray = -decay + 1j * np.sqrt(square)
         return poles
+
+    def edges(
+        self, box: UncertaintyBox, duration: float, most: int = MAX_POINTS
+    ) -> list[FloatArray]:
+        """
+        Return factors on stiffness and damping along the four edges of a box.
+
+        Parameters
+        ----------
+        box
+            What may differ.
+        duration
+            Time over which different arms drift apart [s].
+        most
+            Largest number of points of an edge.
+
+        Returns
+        -------
+        list[FloatArray]
+            Points from corner to corner, each of shape (m, 2) [-]; edges of no length are left
+            out.
+
+        """
+        k, c = box.stiffness, box.damping
+        low, high = np.array([1.0 - k, 1.0 - c]), np.array([1.0 + k, 1.0 + c])
+        corners = [low, np.array([high[0], low[1]]), high, np.array([low[0], high[1]])]
+        edges = []
+        for begin, end in zip(corners, [*corners[1:], corners[0]], strict=True):
+            if (begin == end).all():
+                continue
+            turn = self._turn(begin, end, duration)
+            count = min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most)
+            # Chebyshev points: extremes near corners are seen as well as those inside.
+            share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+            edges.append(begin + share[:, None] * (end - begin))
+        return edges or [low[None]]
+
+    def nodes(self, box: UncertaintyBox, duration: float) -> tuple[FloatArray, FloatArray]:
+        """Return points inside a box, shape (p, 2), and weights of a mean over it, shape (p,)."""
+        axes = []
+        for i, width in enumerate((box.stiffness, box.damping)):
+            begin, end = np.ones((2, 2))
+            begin[i] -= width
+            end[i] += width
+            count = MEAN_NODES + ceil(self._turn(begin, end, duration))
+            places, weights = legendre.leggauss(min(count, MAX_MEAN_NODES))
+            axes.append((1.0 + width * places, 0.5 * weights))
+        (k, k_weights), (c, c_weights) = axes
+        points = np.stack(np.meshgrid(k, c, indexing='ij'), axis=-1).reshape(-1, 2)
+        return points, np.multiply.outer(k_weights, c_weights).ravel()
+
+    def _turn(self, begin: FloatArray, end: FloatArray, duration: float) -> float:
+        """Return how far two arms' oscillations drift apart [rad]."""
+        first, second = self.poles(np.array([begin, end]))
+        return float(duration * abs(second - first))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,6 +248,29 @@ def residual_amplitude(
     return amplitudes
 
 
+def legendre_residuals(
+    oscillator: Oscillator, factors: FloatArray, duration: float, terms: int
+) -> ComplexArray:
+    """
+    Return the residual that each Legendre term of sigma'' leaves per rad, shape (p, terms).
+
+    The integral of P_j(x) exp(z (1 - x)) is a modified spherical Bessel function of z ((I9) of
+    docs/derivation.md), here with its growth taken out.
+    """
+    # Imported here: it takes longer than planning with any other strategy.
+    from scipy.special import ive
+
+    half = 0.5 * duration
+    poles = oscillator.poles(factors)
+    z, order = half * poles[:, None], np.arange(terms)
+    bessel = np.sqrt(np.pi / (2.0 * z)) * ive(order + 0.5, z)
+    integrals = 2.0 * (-1.0) ** order * bessel * np.exp(1j * z.imag)
+    both = oscillator.inertia
+    gain = both / (half * oscillator.free_inertia * poles.imag)
+    rows: ComplexArray = gain[:, None] * integrals
+    return rows
+
+
 def predict_residual(
     arm: PlanarArm,
     effort: FloatArray,
@@ -284,7 +302,7 @@ def predict_residual(
 
     """
     oscillator = Oscillator.of(arm)
-    edges = box.edges(oscillator, duration)
+    edges = oscillator.edges(box, duration)
     factors = np.concatenate([np.ones((1, 2)), *edges])
     poles = oscillator.poles(factors)
     amplitudes = residual_amplitude(oscillator, effort, duration, poles, start)

@@ -20,14 +20,19 @@ from core.conftest import ARM, ELBOW, envelope
 from flat_planner_ros.core.arm.errors import InvalidRequest, OutOfReach
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
-from flat_planner_ros.core.insensitive.law import insensitive_motion, least_effort
+from flat_planner_ros.core.insensitive.insensitivity import (
+    Criterion,
+    Insensitivity,
+    Nominal,
+    UncertaintyBox,
+)
+from flat_planner_ros.core.insensitive.law import insensitive_motion
+from flat_planner_ros.core.insensitive.momentum_angle import least_effort
 from flat_planner_ros.core.insensitive.residual import (
     Oscillator,
     predict_residual,
     residual_amplitude,
-    UncertaintyBox,
 )
-from flat_planner_ros.core.insensitive.settings import Criterion, Insensitivity, Nominal
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
@@ -185,7 +190,7 @@ def test_no_other_law_of_the_same_effort_is_clearly_better(nominal):
     torque = result.sample(duration / 2000.0).driving_effort
     times = np.linspace(0.0, duration, len(torque))
     oscillator = Oscillator.of(ARM)
-    factors = np.concatenate(BOX.edges(oscillator, duration))
+    factors = np.concatenate(oscillator.edges(BOX, duration))
     poles = oscillator.poles(factors)
     nominal_pole = oscillator.poles(np.ones((1, 2)))[0]
     # Changes of the torque, smooth and zero at both ends, that keep the motion of the rigid arm

@@ -15,8 +15,8 @@
 """Commands of insensitive motions played by MuJoCo, on arms that differ from the model."""
 
 from core.conftest import ARM, envelope
+from flat_planner_ros.core.insensitive.insensitivity import Insensitivity, Nominal
 from flat_planner_ros.core.insensitive.residual import Oscillator, residual_amplitude
-from flat_planner_ros.core.insensitive.settings import Insensitivity, Nominal
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions

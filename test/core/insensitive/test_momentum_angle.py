@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Laws shaped by their effort: basis, answer of the planned variable, by independent routes."""
+"""Laws shaped by their effort: basis, response of the planned variable, by independent routes."""
 
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.insensitive.momentum_angle import (
-    answer,
     CONTACT,
     momentum_basis,
+    response,
     SPLIT_TURN,
 )
 import numpy as np
@@ -61,7 +61,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
     fourth, torque, _ = random_law(modes)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
     mapping = flat_map(ARM, FlatModel.EXACT)
-    law = answer(fourth, torque, mapping, duration)
+    law = response(fourth, torque, mapping, duration)
     half = duration / 2.0
     inner, damped, coupled = mapping.effort[2:]
     sigma = legendre.legint(torque, 2, lbnd=-1)
@@ -88,7 +88,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
 def test_derivatives_are_derivatives(share):
     fourth, torque, _ = random_law(8)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
-    law = answer(fourth, torque, flat_map(ARM, FlatModel.EXACT), duration).over(2.0, 0.3)
+    law = response(fourth, torque, flat_map(ARM, FlatModel.EXACT), duration).over(2.0, 0.3)
     t, h = np.linspace(0.1, 0.9, 9) * duration, 1e-5 * duration
     jet, after, before = law.jet(t, 8), law.jet(t + h, 8), law.jet(t - h, 8)
     slope = (after - before) / (2.0 * h)

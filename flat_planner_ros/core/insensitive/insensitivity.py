@@ -12,14 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How insensitive a motion shall be: the uncertainty, and effort traded against the residual."""
+"""How insensitive a motion shall be: what is uncertain, and effort against the residual."""
 
 from dataclasses import dataclass, field
 from enum import Enum
 from math import isfinite
 
 from flat_planner_ros.core.arm import InvalidRequest
-from flat_planner_ros.core.insensitive.residual import UncertaintyBox
+
+MAX_HALF_WIDTH = 0.9
+"""Widest uncertainty of a parameter, as a share of its nominal value [-]."""
 
 DEFAULT_WEIGHT = 700.0
 """Weight where nothing is chosen: a residual of 1/700 of the way costs as much as all effort."""
@@ -29,6 +31,31 @@ MAX_INSENSITIVITY = 1e5
 
 MIN_MODES, MAX_MODES = 6, 48
 """Range of the number of free coefficients of the law."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertaintyBox:
+    """
+    Range of the true stiffness and damping about the nominal ones.
+
+    Attributes
+    ----------
+    stiffness, damping
+        Half-widths as shares of the nominal values [-].
+
+    """
+
+    stiffness: float = 0.1
+    damping: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse a box that reaches arms without a spring."""
+        for name in ('stiffness', 'damping'):
+            width = getattr(self, name)
+            if not 0.0 <= width <= MAX_HALF_WIDTH:
+                raise InvalidRequest(
+                    f'half-width of the {name} is {width:g}, outside [0, {MAX_HALF_WIDTH:g}]'
+                )
 
 
 class Nominal(Enum):
@@ -111,3 +138,8 @@ class Insensitivity:
             raise InvalidRequest(
                 f'insensitivity.modes must be in [{MIN_MODES}, {MAX_MODES}], got {self.modes}'
             )
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether effort or residual has a bound, from which the weight follows."""
+        return self.max_effort_rms > 0.0 or self.max_residual > 0.0
