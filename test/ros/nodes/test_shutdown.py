@@ -32,7 +32,7 @@ MOMENTS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 2.0)
 
 SHUTDOWN = """
 import sys, threading
-from flat_planner_ros.ros.plant_node import main
+from flat_planner_ros.ros.nodes.plant_node import main
 import rclpy
 threading.Timer({delay}, rclpy.try_shutdown).start()
 sys.exit(main())
@@ -40,7 +40,7 @@ sys.exit(main())
 
 OVERTAKEN = """
 import sys
-from flat_planner_ros.ros.node_runner import run
+from flat_planner_ros.ros.nodes.node_runner import run
 import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String
