@@ -308,15 +308,15 @@ class _Problem:
 def _motion(arm: PlanarArm, problem: _Problem, found: _Compromise) -> InsensitiveMotion:
     """Return the law of a solution, with its certificate."""
     basis = problem.basis
-    torque = basis.torque_start + basis.torque_directions @ found.c
+    second = basis.second_start + basis.second_directions @ found.c
     fourth = basis.start + basis.directions @ found.c
     mapping = flat_map(arm, FlatModel.EXACT)
-    law = response(fourth, torque, mapping, problem.duration)
+    law = response(fourth, second, mapping, problem.duration)
     is_exact = problem.wanted.nominal is Nominal.EXACT
     return InsensitiveMotion(
         law=law,
         cost=found.cost,
-        boundary_residual=largest_miss(law, torque, mapping, rests_at_end=is_exact),
+        boundary_residual=largest_miss(law, second, mapping, rests_at_end=is_exact),
         stationarity=found.stationarity,
     )
 
@@ -340,9 +340,9 @@ def _residuals(
         Shapes (2 p, modes) and (2 p,) [-].
 
     """
-    rows = legendre_residuals(oscillator, factors, duration, len(basis.torque_start))
+    rows = legendre_residuals(oscillator, factors, duration, len(basis.second_start))
     stacked = np.concatenate([rows.real, rows.imag])
-    return stacked @ basis.torque_directions, stacked @ basis.torque_start
+    return stacked @ basis.second_directions, stacked @ basis.second_start
 
 
 def _search(

@@ -16,7 +16,7 @@
 Momentum angle: laws of the planned variable that are shaped by their effort.
 
 The momentum angle sigma is the angle that the last two links would have if they were one rigid
-body: I*_(n-1) sigma'' = tau, whatever the spring does ((I4) of docs/derivation.md). Any torque is
+body: I*_(n-1) sigma'' = tau, whatever the spring does ((I4) of docs/derivation.md). Any effort is
 therefore a sigma, expanded here in Legendre polynomials, and the planned variable w answers to it
 like an oscillator: w + delta w' + w'' / omega^2 = sigma.
 """
@@ -79,7 +79,7 @@ class MomentumBasis:
         Legendre coefficients of sigma^(4) of the law of least effort in the space, shape (m,).
     directions
         Those of changes, whose sigma'' are orthonormal, shape (m, modes).
-    torque_start, torque_directions
+    second_start, second_directions
         Legendre coefficients of sigma'' of both, shapes (m + 2,) and (m + 2, modes).
     least
         Integral of sigma''^2 of `start`.
@@ -88,8 +88,8 @@ class MomentumBasis:
 
     start: FloatArray
     directions: FloatArray
-    torque_start: FloatArray
-    torque_directions: FloatArray
+    second_start: FloatArray
+    second_directions: FloatArray
     least: float
 
     def changed(self, origin: FloatArray, directions: FloatArray) -> 'MomentumBasis':
@@ -107,8 +107,8 @@ class MomentumBasis:
         return MomentumBasis(
             start=self.start + self.directions @ origin,
             directions=self.directions @ directions,
-            torque_start=self.torque_start + self.torque_directions @ origin,
-            torque_directions=self.torque_directions @ directions,
+            second_start=self.second_start + self.second_directions @ origin,
+            second_directions=self.second_directions @ directions,
             least=self.least + float(origin @ origin),
         )
 
@@ -139,18 +139,18 @@ def momentum_basis(modes: int) -> MomentumBasis:
     orthonormal, triangle = np.linalg.qr(norm[:, None] * (twice @ changes))
     directions = np.linalg.solve(triangle.T, changes.T).T
     # `start` still lacks constants of integration: sigma'' of the polynomial of least degree.
-    second = np.zeros(size + 2)
+    second_start = np.zeros(size + 2)
     exact = legendre.legder(speed / (2.0 * speed[0]), 1)
-    second[: len(exact)] = exact
-    share = orthonormal.T @ (norm * second)
-    torque_directions = orthonormal / norm[:, None]
-    torque_start = second - torque_directions @ share
+    second_start[: len(exact)] = exact
+    share = orthonormal.T @ (norm * second_start)
+    second_directions = orthonormal / norm[:, None]
+    second_start -= second_directions @ share
     return MomentumBasis(
         start=start - directions @ share,
         directions=directions,
-        torque_start=torque_start,
-        torque_directions=torque_directions,
-        least=float(np.sum((norm * torque_start) ** 2)),
+        second_start=second_start,
+        second_directions=second_directions,
+        least=float(np.sum((norm * second_start) ** 2)),
     )
 
 
@@ -234,7 +234,7 @@ class SeriesLaw:
 
 
 def response(
-    fourth: FloatArray, torque: FloatArray, flat_map: FlatMap, duration: float
+    fourth: FloatArray, second: FloatArray, flat_map: FlatMap, duration: float
 ) -> SeriesLaw:
     """
     Return the planned variable from rest at -1/2 that follows a momentum angle.
@@ -243,7 +243,7 @@ def response(
     ----------
     fourth
         Legendre coefficients of sigma^(4) in x, shape (m,).
-    torque
+    second
         Those of sigma'', shape (m + 2,).
     flat_map
         Exact map of the arm.
@@ -260,7 +260,7 @@ def response(
     delta, epsilon = damped / inner / half, coupled / inner / half**2
     turn = epsilon**-0.5
     if turn > SPLIT_TURN * len(fourth):
-        return _split(torque, delta, epsilon, duration)
+        return _split(second, delta, epsilon, duration)
     size = len(fourth) + ceil(TERMS_PER_TURN * turn) + SPARE_TERMS
     once = integration(size)
     padded = np.zeros(size)
@@ -276,12 +276,12 @@ def response(
     return SeriesLaw(duration=duration, table=table)
 
 
-def _split(torque: FloatArray, delta: float, epsilon: float, duration: float) -> SeriesLaw:
+def _split(second: FloatArray, delta: float, epsilon: float, duration: float) -> SeriesLaw:
     """Return the same as a particular solution, a polynomial, and the natural oscillation."""
-    size = len(torque) + 2
+    size = len(second) + 2
     once = integration(size)
     sigma = np.zeros((JET_ORDER + 1, size))
-    sigma[2, : len(torque)] = torque
+    sigma[2, : len(second)] = second
     sigma[1] = once @ sigma[2]
     sigma[0] = once @ sigma[1]
     sigma[0, 0] -= 0.5
@@ -303,7 +303,7 @@ def _split(torque: FloatArray, delta: float, epsilon: float, duration: float) ->
 
 
 def largest_miss(
-    law: SeriesLaw, torque: FloatArray, mapping: FlatMap, *, rests_at_end: bool
+    law: SeriesLaw, second: FloatArray, mapping: FlatMap, *, rests_at_end: bool
 ) -> float:
     """Return the largest miss at the ends, and of the effort in between, relative to peaks."""
     half = 0.5 * law.duration
@@ -312,7 +312,7 @@ def largest_miss(
     both = mapping.effort[2]
     # sigma and its derivatives from w, by the row that takes w to I sigma''.
     sigma = np.array([apply_row(mapping.effort[2:] / both, jet, k) for k in range(CONTACT + 1)])
-    expected = legendre.legval(times / half - 1.0, torque) / half**2
+    expected = legendre.legval(times / half - 1.0, second) / half**2
     effort = apply_row(mapping.effort, jet) / both
     misses = [np.abs(effort - expected).max() / np.abs(expected).max()]
     misses += [_end_miss(jet[:JET_ORDER], 0), _end_miss(sigma, -1)]

@@ -15,7 +15,7 @@
 """
 Effort against residual: what a motion leaves behind, what others would, and what time buys.
 
-Nothing here is simulated: every residual is the integral of `robustness` over the effort.
+Nothing here is simulated: every residual is an integral over the effort (`insensitive.residual`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -172,7 +172,7 @@ def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:
         return ()
     options = replace(planned.options, strategy=Strategy.POLYNOMIAL)
     try:
-        found = [_point('polynomial', plan(request, arm, options))]
+        found = [_point_of('polynomial', plan(request, arm, options))]
     except InvalidRequest:
         return ()
     times = np.linspace(0.0, request.duration, INTERVALS + 1)
@@ -182,21 +182,10 @@ def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:
             effort = shaped_quintic(arm, distance, request.duration, shaper, times)
         except InvalidRequest:
             continue
-        residual = predict_residual(
-            arm, effort, request.duration, planned.options.insensitivity.box
-        )
+        box = planned.options.insensitivity.box
+        residual = predict_residual(arm, effort, request.duration, box)
         name = 'quintic' if shaper is Shaper.NONE else f'{shaper.name.lower()}_quintic'
-        found.append(
-            TradeoffPoint(
-                series=name,
-                duration=request.duration,
-                weight=0.0,
-                rms_effort=_rms(effort),
-                peak_effort=float(np.abs(effort).max()),
-                nominal=residual.nominal,
-                worst=residual.worst,
-            )
-        )
+        found.append(_point(name, request.duration, effort, residual))
     return tuple(found)
 
 
@@ -229,7 +218,7 @@ def tradeoff_points(
 
     """
     points = [
-        _point(strategy.value, plan(request, arm, replace(options, strategy=strategy)))
+        _point_of(strategy.value, plan(request, arm, replace(options, strategy=strategy)))
         for strategy in STRATEGIES
     ]
     reference = plan(request, arm, replace(options, strategy=Strategy.POLYNOMIAL))
@@ -262,24 +251,30 @@ def _sweep(
             arm,
             replace(options, strategy=Strategy.INSENSITIVE, insensitivity=wanted),
         )
-        yield _point(f'insensitive_{nominal.value}', planned, weight)
+        yield _point_of(f'insensitive_{nominal.value}', planned, weight)
 
 
-def _point(series: str, planned: Plan, weight: float = 0.0) -> TradeoffPoint:
+def _point_of(series: str, planned: Plan, weight: float = 0.0) -> TradeoffPoint:
     """Return a plan as a point."""
     samples = planned.sample(planned.duration / INTERVALS)
     residual = residual_of_plan(planned, samples)
+    return _point(series, planned.duration, samples.driving_effort, residual, weight)
+
+
+def _point(
+    series: str,
+    duration: float,
+    effort: FloatArray,
+    residual: PredictedResidual,
+    weight: float = 0.0,
+) -> TradeoffPoint:
+    """Return a point from an effort that is zero at both ends, on an even grid."""
     return TradeoffPoint(
         series=series,
-        duration=planned.duration,
+        duration=duration,
         weight=weight,
-        rms_effort=_rms(samples.driving_effort),
-        peak_effort=float(np.abs(samples.driving_effort).max()),
+        rms_effort=float(np.sqrt((effort @ effort) / (len(effort) - 1))),
+        peak_effort=float(np.abs(effort).max()),
         nominal=residual.nominal,
         worst=residual.worst,
     )
-
-
-def _rms(effort: FloatArray) -> float:
-    """Return the root mean square of an effort that is zero at both ends, on an even grid."""
-    return float(np.sqrt((effort @ effort) / (len(effort) - 1)))

@@ -73,7 +73,7 @@ twelve end conditions, the others without end conditions.
 """
 
 EXACT_BOUND = {0.08: 0.00713, 0.06: 0.00772, 0.04: 0.00897, 0.02: 0.01065, 0.01: 0.0169}
-"""The same at T = 1 s with no residual on the nominal arm, for any torque whatever."""
+"""The same at T = 1 s with no residual on the nominal arm, for any effort whatever."""
 
 
 def planned(duration=1.0, arm=ARM, final=(np.pi, 0.0), **wanted):
@@ -81,8 +81,8 @@ def planned(duration=1.0, arm=ARM, final=(np.pi, 0.0), **wanted):
     request = MotionRequest(start=np.zeros(arm.n), final=np.array(final), duration=duration)
     options = PlanningOptions(strategy=Strategy.INSENSITIVE, insensitivity=Insensitivity(**wanted))
     result = plan(request, arm, options)
-    torque = result.sample(duration / 4000.0).driving_effort
-    return result, predict_residual(arm, torque, duration, options.insensitivity.box)
+    effort = result.sample(duration / 4000.0).driving_effort
+    return result, predict_residual(arm, effort, duration, options.insensitivity.box)
 
 
 @pytest.mark.parametrize(('duration', 'residual'), FRONT)
@@ -114,7 +114,7 @@ def test_a_small_residual_at_moderate_effort():
 
 @cache
 def functionals(duration):
-    """Return nodes' weights, and rows of the motion and of residuals over the box on a torque."""
+    """Return nodes' weights, and rows of the motion and of residuals over the box on an effort."""
     nodes, weights = np.polynomial.legendre.leggauss(120)
     left, weights = duration * (1.0 - nodes) / 2.0, duration * weights / 2.0
     rigid = np.array([np.ones_like(left), left])
@@ -131,18 +131,18 @@ def functionals(duration):
 
 def least_rms(duration, residual, *, exact):
     """
-    Return a lower bound on the RMS of all torques from 0 to pi with a worst residual.
+    Return a lower bound on the RMS of all efforts from 0 to pi with a worst residual.
 
-    For any weights mu >= 0, min over all torques of |tau|^2 + sum mu (A^2 - residual^2) is one:
+    For any weights mu >= 0, min over all efforts of |tau|^2 + sum mu (A^2 - residual^2) is one:
     weak duality, whatever the weights. The minimiser lies in the span of the functionals, so the
-    minimum over all square-integrable torques is a finite system.
+    minimum over all square-integrable efforts is a finite system.
     """
     weights, rigid, rows = functionals(duration)
     conditions = [*rigid, rows[0].real, rows[0].imag] if exact else [*rigid]
     wish = np.array([0.0, ARM.inertia_star.both * np.pi, 0.0, 0.0][: len(conditions)])
     box = rows[1:]
     every = np.array([*conditions, *box.real, *box.imag])
-    # Orthonormal torques of that span, and the functionals in these coordinates.
+    # Orthonormal efforts of that span, and the functionals in these coordinates.
     _, sizes, span = np.linalg.svd(every * np.sqrt(weights), full_matrices=False)
     span = span[sizes > 1e-13 * sizes[0]]
     matrix = (every * np.sqrt(weights)) @ span.T
@@ -187,13 +187,13 @@ def test_exact_and_the_front_exclude_each_other():
 def test_no_other_law_of_the_same_effort_is_clearly_better(nominal):
     duration, rng = 1.0, np.random.default_rng(1)
     result, left = planned(duration, nominal=nominal)
-    torque = result.sample(duration / 2000.0).driving_effort
-    times = np.linspace(0.0, duration, len(torque))
+    effort = result.sample(duration / 2000.0).driving_effort
+    times = np.linspace(0.0, duration, len(effort))
     oscillator = Oscillator.of(ARM)
     factors = np.concatenate(oscillator.edges(BOX, duration))
     poles = oscillator.poles(factors)
     nominal_pole = oscillator.poles(np.ones((1, 2)))[0]
-    # Changes of the torque, smooth and zero at both ends, that keep the motion of the rigid arm
+    # Changes of the effort, smooth and zero at both ends, that keep the motion of the rigid arm
     # and, where that is asked for, the nominal residual.
     bumps = np.array([np.sin(np.pi * times) ** 2 * np.cos(j * np.pi * times) for j in range(18)])
     keep = [np.ones_like(times), times]
@@ -204,13 +204,13 @@ def test_no_other_law_of_the_same_effort_is_clearly_better(nominal):
     best = np.inf
     for _ in range(300):
         change = rng.normal(size=len(null)) @ null @ bumps
-        change *= 10.0 ** rng.uniform(-3.0, -0.5) * np.abs(torque).max() / np.abs(change).max()
+        change *= 10.0 ** rng.uniform(-3.0, -0.5) * np.abs(effort).max() / np.abs(change).max()
         # As much effort as before, or less: along a change effort is a parabola.
-        if change @ (2.0 * torque + change) > 0.0:
+        if change @ (2.0 * effort + change) > 0.0:
             change *= -1.0
-        if change @ (2.0 * torque + change) > 0.0:
+        if change @ (2.0 * effort + change) > 0.0:
             continue
-        residuals = residual_amplitude(oscillator, torque + change, duration, poles)
+        residuals = residual_amplitude(oscillator, effort + change, duration, poles)
         best = min(best, residuals.max())
     assert 0.97 * left.worst < best < np.inf
 
@@ -250,9 +250,9 @@ def test_the_last_sample_rests_at_the_goal(arm, nominal):
 def test_the_residual_is_of_second_order_where_it_is_weighed_most():
     def residual(share, **options):
         result = plan(request, ARM, PlanningOptions(**options))
-        torque = result.sample(1e-3).driving_effort
+        effort = result.sample(1e-3).driving_effort
         place = oscillator.poles(np.array([[1.0 + share, 1.0], [1.0 - share, 1.0]]))
-        return residual_amplitude(oscillator, torque, 1.5, place).max()
+        return residual_amplitude(oscillator, effort, 1.5, place).max()
 
     request = MotionRequest(start=np.zeros(2), final=np.array([1.0, 0.0]), duration=1.5)
     oscillator = Oscillator.of(ARM)
@@ -279,8 +279,8 @@ def test_more_weight_is_more_effort_and_less_residual(nominal, criterion):
 def test_any_duration(duration, nominal):
     result, left = planned(duration, nominal=nominal)
     polynomial = plan(result.request, ARM, PlanningOptions())
-    torque = polynomial.sample(duration / 4000.0).driving_effort
-    other = predict_residual(ARM, torque, duration, BOX)
+    effort = polynomial.sample(duration / 4000.0).driving_effort
+    other = predict_residual(ARM, effort, duration, BOX)
     assert result.boundary_residual < 1e-9
     if duration >= 0.5:  # below, the polynomial law takes many times the effort
         assert left.worst <= max(other.worst, 1e-3)

@@ -36,35 +36,35 @@ def random_law(modes=16, seed=0):
     basis, c = momentum_basis(modes), np.random.default_rng(seed).normal(size=modes)
     return (
         basis.start + basis.directions @ c,
-        basis.torque_start + basis.torque_directions @ c,
+        basis.second_start + basis.second_directions @ c,
         basis.least + c @ c,
     )
 
 
 @pytest.mark.parametrize('modes', [6, 16, 48])
 def test_the_basis_moves_from_rest_to_rest(modes):
-    fourth, torque, square = random_law(modes)
-    size = np.abs(torque).max()
-    assert legendre.legder(torque, 2) == pytest.approx(fourth[: modes + 4], abs=1e-9 * size)
-    sigma = legendre.legint(torque, 2, lbnd=-1)
+    fourth, second, square = random_law(modes)
+    size = np.abs(second).max()
+    assert legendre.legder(second, 2) == pytest.approx(fourth[: modes + 4], abs=1e-9 * size)
+    sigma = legendre.legint(second, 2, lbnd=-1)
     assert legendre.legval(1.0, sigma) == pytest.approx(1.0, abs=1e-12 * size)
     for order in range(1, CONTACT + 1):
         ends = legendre.legval([-1.0, 1.0], legendre.legder(sigma, order))
         assert ends == pytest.approx(0.0, abs=1e-9 * size * modes ** (2 * order - 2))
-    integral, _ = quad(lambda x: legendre.legval(x, torque) ** 2, -1, 1, epsabs=0, limit=200)
+    integral, _ = quad(lambda x: legendre.legval(x, second) ** 2, -1, 1, epsabs=0, limit=200)
     assert square == pytest.approx(integral, rel=1e-9)
 
 
 @pytest.mark.parametrize('modes', [16, 40])
 @pytest.mark.parametrize('share', [0.01, 0.2, 0.99, 1.01, 3.0])
 def test_the_planned_variable_answers_like_an_oscillator(modes, share):
-    fourth, torque, _ = random_law(modes)
+    fourth, second, _ = random_law(modes)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
     mapping = flat_map(ARM, FlatModel.EXACT)
-    law = response(fourth, torque, mapping, duration)
+    law = response(fourth, second, mapping, duration)
     half = duration / 2.0
     inner, damped, coupled = mapping.effort[2:]
-    sigma = legendre.legint(torque, 2, lbnd=-1)
+    sigma = legendre.legint(second, 2, lbnd=-1)
 
     def rates(x, state):
         force = legendre.legval(x, sigma) - state[0] - damped / inner / half * state[1]
@@ -76,7 +76,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
     assert jet[0] + 0.5 == pytest.approx(solution.y[0], abs=1e-9 * np.abs(solution.y[0]).max())
     # The effort of the flat map is that of the momentum angle.
     effort = mapping.effort @ jet[:5]
-    expected = inner / half**2 * legendre.legval(x, torque)
+    expected = inner / half**2 * legendre.legval(x, second)
     assert effort == pytest.approx(expected, abs=1e-10 * np.abs(expected).max())
     # At rest at the start.
     for order in range(6):
@@ -86,9 +86,9 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
 
 @pytest.mark.parametrize('share', [0.2, 2.0])
 def test_derivatives_are_derivatives(share):
-    fourth, torque, _ = random_law(8)
+    fourth, second, _ = random_law(8)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
-    law = response(fourth, torque, flat_map(ARM, FlatModel.EXACT), duration).over(2.0, 0.3)
+    law = response(fourth, second, flat_map(ARM, FlatModel.EXACT), duration).over(2.0, 0.3)
     t, h = np.linspace(0.1, 0.9, 9) * duration, 1e-5 * duration
     jet, after, before = law.jet(t, 8), law.jet(t + h, 8), law.jet(t - h, 8)
     slope = (after - before) / (2.0 * h)

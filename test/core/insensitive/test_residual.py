@@ -32,18 +32,18 @@ FACTORS = [(1.0, 1.0), (1.1, 1.1), (0.9, 0.9), (1.1, 0.9), (0.5, 1.8), (1.7, 0.0
 
 
 def bump(duration, points=101):
-    """Return times and a torque that is zero at both ends and nothing that a planner would do."""
+    """Return times and an effort that is zero at both ends and nothing that a planner would do."""
     times = np.linspace(0.0, duration, points)
     x = 2.0 * times / duration - 1.0
-    torque = 0.01 * (1.0 - x**2) ** 2 * (np.sin(4.0 * x) + 0.3 * np.cos(9.0 * x))
-    torque[0] = torque[-1] = 0.0
-    return times, torque
+    effort = 0.01 * (1.0 - x**2) ** 2 * (np.sin(4.0 * x) + 0.3 * np.cos(9.0 * x))
+    effort[0] = effort[-1] = 0.0
+    return times, effort
 
 
-def simulated_amplitude(arm, times, torque, *, position=None, motors=1):
+def simulated_amplitude(arm, times, effort, *, position=None, motors=1):
     """Return the envelope of the passive joint at the end, from the simulated arm."""
     efforts = np.zeros((len(times), motors))
-    efforts[:, -1] = torque
+    efforts[:, -1] = effort
     step = (times[1] - times[0]) / 8.0
     profile = EffortProfile(start=0.0, times=times, efforts=efforts)
     motion = rollout(arm, profile, times[-1], step=step, position=position)
@@ -54,33 +54,33 @@ def simulated_amplitude(arm, times, torque, *, position=None, motors=1):
 @pytest.mark.parametrize('factors', FACTORS)
 @pytest.mark.parametrize('duration', [0.4, 1.0, 3.0])
 def test_the_prediction_is_what_the_simulated_arm_does(factors, duration):
-    times, torque = bump(duration)
+    times, effort = bump(duration)
     oscillator = Oscillator.of(ARM)
     poles = oscillator.poles(np.array([factors]))
-    (predicted,) = residual_amplitude(oscillator, torque, duration, poles)
+    (predicted,) = residual_amplitude(oscillator, effort, duration, poles)
     other = ARM.scaled(stiffness=factors[0], damping=factors[1])
-    assert predicted == pytest.approx(simulated_amplitude(other, times, torque), rel=1e-6)
+    assert predicted == pytest.approx(simulated_amplitude(other, times, effort), rel=1e-6)
 
 
 def test_the_passive_joint_may_swing_at_the_start():
-    times, torque = bump(1.0)
-    torque[0] = 0.004
+    times, effort = bump(1.0)
+    effort[0] = 0.004
     oscillator = Oscillator.of(ARM)
     poles = oscillator.poles(np.array([[1.1, 0.8]]))
-    (predicted,) = residual_amplitude(oscillator, torque, 1.0, poles, (0.2, 0.0))
+    (predicted,) = residual_amplitude(oscillator, effort, 1.0, poles, (0.2, 0.0))
     other = ARM.scaled(stiffness=1.1, damping=0.8)
-    simulated = simulated_amplitude(other, times, torque, position=[0.0, 0.2])
+    simulated = simulated_amplitude(other, times, effort, position=[0.0, 0.2])
     assert predicted == pytest.approx(simulated, rel=1e-6)
 
 
 def test_links_before_the_last_two_do_not_matter():
-    times, torque = bump(1.0)
+    times, effort = bump(1.0)
     oscillator = Oscillator.of(ELBOW)
     poles = oscillator.poles(np.array([[0.9, 1.1]]))
-    (predicted,) = residual_amplitude(oscillator, torque, 1.0, poles)
+    (predicted,) = residual_amplitude(oscillator, effort, 1.0, poles)
     other = ELBOW.scaled(stiffness=0.9, damping=1.1)
     assert predicted == pytest.approx(
-        simulated_amplitude(other, times, torque, motors=2), rel=1e-6
+        simulated_amplitude(other, times, effort, motors=2), rel=1e-6
     )
 
 
@@ -89,32 +89,32 @@ def test_links_before_the_last_two_do_not_matter():
     'box', [UncertaintyBox(), UncertaintyBox(stiffness=0.4, damping=0.8)], ids=['10 %', 'wide']
 )
 def test_the_worst_of_the_box_is_on_its_boundary(duration, box):
-    _, torque = bump(duration)
+    _, effort = bump(duration)
     oscillator = Oscillator.of(ARM)
     k, c = np.meshgrid(
         1.0 + box.stiffness * np.linspace(-1.0, 1.0, 201),
         1.0 + box.damping * np.linspace(-1.0, 1.0, 21),
     )
     poles = oscillator.poles(np.column_stack([k.ravel(), c.ravel()]))
-    everywhere = residual_amplitude(oscillator, torque, duration, poles)
-    predicted = predict_residual(ARM, torque, duration, box)
+    everywhere = residual_amplitude(oscillator, effort, duration, poles)
+    predicted = predict_residual(ARM, effort, duration, box)
     assert predicted.worst == pytest.approx(everywhere.max(), rel=1e-3)
     assert predicted.worst >= everywhere.max() * (1.0 - 1e-4)
 
 
 def test_the_place_of_the_worst_is_named():
-    _, torque = bump(1.0)
-    predicted = predict_residual(ARM, torque, 1.0, UncertaintyBox(stiffness=0.2))
+    _, effort = bump(1.0)
+    predicted = predict_residual(ARM, effort, 1.0, UncertaintyBox(stiffness=0.2))
     oscillator = Oscillator.of(ARM)
     place = np.array([[predicted.stiffness_factor, predicted.damping_factor], [1.0, 1.0]])
-    worst, nominal = residual_amplitude(oscillator, torque, 1.0, oscillator.poles(place))
+    worst, nominal = residual_amplitude(oscillator, effort, 1.0, oscillator.poles(place))
     assert worst == pytest.approx(predicted.worst, rel=1e-4)
     assert nominal == pytest.approx(predicted.nominal, rel=1e-12)
 
 
 def test_a_box_without_size_is_the_nominal_arm():
-    _, torque = bump(1.0)
-    predicted = predict_residual(ARM, torque, 1.0, UncertaintyBox(stiffness=0.0, damping=0.0))
+    _, effort = bump(1.0)
+    predicted = predict_residual(ARM, effort, 1.0, UncertaintyBox(stiffness=0.0, damping=0.0))
     assert predicted.worst == predicted.nominal
 
 
