@@ -29,7 +29,8 @@ from flat_planner_ros.ros.parameters import (
 from flat_planner_ros.ros.parameters import (
     plant as plant_parameters,
 )
-from flat_planner_ros.ros.parameters.declaration import model_rows, Row
+from flat_planner_ros.ros.parameters.arm_model import MODEL_ROWS
+from flat_planner_ros.ros.parameters.row import Row
 
 PAGE = Path(__file__).resolve().parent / 'interfaces.md'
 """The page with the tables."""
@@ -53,16 +54,15 @@ def _table(name: str) -> str:
 
 def _rows(name: str) -> Iterator[Row]:
     """Return the rows of a node that are not the model's, or those of the model."""
-    model = list(model_rows(read_only=False))
     modules = {
         'planner': planner_parameters,
         'plant': plant_parameters,
         'monitor': monitor_parameters,
     }
     if name == 'model':
-        yield from model
+        yield from MODEL_ROWS
         return
-    shared = {row.name for row in model}
+    shared = {row.name for row in MODEL_ROWS}
     yield from (row for row in modules[name].ROWS if row.name not in shared)
 
 

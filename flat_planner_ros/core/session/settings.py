@@ -16,7 +16,6 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from math import inf
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.planning import (
@@ -97,8 +96,8 @@ class SessionSettings:
     options: PlanningOptions
     period: float = 0.005
     default_duration: float = 0.0
-    min_duration: float = 0.0
-    max_duration: float = inf
+    min_duration: float = 0.05
+    max_duration: float = 600.0
     limits: JointLimits | None = None
     on_violation: OnViolation = OnViolation.REJECT
     start_source: StartSource = StartSource.AUTO

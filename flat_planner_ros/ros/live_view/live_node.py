@@ -26,7 +26,7 @@ from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest
 from flat_planner_ros.ros.live_view.feed import Feed
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
-from flat_planner_ros.ros.parameters.declaration import InvalidParameter
+from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, interfaces
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node

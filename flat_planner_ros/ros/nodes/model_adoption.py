@@ -19,7 +19,7 @@ from collections.abc import Callable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import AdoptionRefused, ModelTuner
-from flat_planner_ros.ros.parameters.declaration import model_parameters
+from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 from rclpy.node import Node

@@ -31,12 +31,10 @@ from flat_planner_ros.core.monitor import (
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
-from flat_planner_ros.ros.parameters.declaration import (
-    InvalidParameter,
-    model_parameters,
-    NodeParameters,
-)
+from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.monitor import build, ROWS
+from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
+from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from rclpy.clock import Clock, ClockType

@@ -28,7 +28,7 @@ from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
-from flat_planner_ros.ros.parameters.declaration import NodeParameters
+from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
 from rclpy.clock import Clock, ClockType

@@ -22,8 +22,9 @@ from flat_planner_ros.core.arm import FlatPlannerError, InvalidCommand
 from flat_planner_ros.core.plant import ArmState, PacedArm
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.node_runner import run
-from flat_planner_ros.ros.parameters.declaration import InvalidParameter, NodeParameters
+from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
+from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, interfaces
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from rclpy.clock import Clock as RosClock

@@ -23,64 +23,70 @@ from flat_planner_ros.core.insensitive import (
     Nominal,
     UncertaintyBox,
 )
-from flat_planner_ros.ros.parameters.declaration import Row, Values
+from flat_planner_ros.ros.parameters.row import Row, Values
 
 INSENSITIVITY_ROWS = [
     Row(
-        name='insensitivity.stiffness',
-        default=0.1,
-        description='uncertainty of the stiffness, half-width as a share of the nominal value; '
+        'insensitivity.stiffness',
+        UncertaintyBox.stiffness,
+        '',
+        'uncertainty of the stiffness, half-width as a share of the nominal value',
         'also of the predicted residual',
         lower=0.0,
         upper=MAX_HALF_WIDTH,
     ),
     Row(
-        name='insensitivity.damping',
-        default=0.1,
-        description='the same of the damping',
+        'insensitivity.damping',
+        UncertaintyBox.damping,
+        '',
+        'the same of the damping',
         lower=0.0,
         upper=MAX_HALF_WIDTH,
     ),
     Row(
-        name='insensitivity.nominal',
-        default=Nominal.EXACT.value,
-        description='what strategy insensitive may leave on the nominal arm: exact = nothing, '
-        'free = up to the worst residual, which takes less effort',
-        choices=tuple(nominal.value for nominal in Nominal),
+        'insensitivity.nominal',
+        Insensitivity.nominal,
+        '',
+        'what strategy insensitive may leave on the nominal arm: exact = nothing, free = up to '
+        'the worst residual, which takes less effort',
     ),
     Row(
-        name='insensitivity.criterion',
-        default=Criterion.WORST.value,
-        description='which residual strategy insensitive weighs: worst or (root) mean (square)',
-        choices=tuple(criterion.value for criterion in Criterion),
+        'insensitivity.criterion',
+        Insensitivity.criterion,
+        '',
+        'which residual strategy insensitive weighs: worst or (root) mean (square)',
     ),
     Row(
-        name='insensitivity.weight',
-        default=0.0,
-        description=f'a residual of distance / weight costs as much as the least effort; 0 = '
-        f'{DEFAULT_WEIGHT:g}, or what follows from the next two',
+        'insensitivity.weight',
+        Insensitivity.weight,
+        '',
+        'a residual of distance / weight costs as much as the least effort',
+        f'0 = {DEFAULT_WEIGHT:g}, or what follows from the next two',
         lower=0.0,
         upper=MAX_INSENSITIVITY,
     ),
     Row(
-        name='insensitivity.max_effort_rms',
-        default=0.0,
-        description='RMS effort [N m] within which strategy insensitive leaves as little as it '
-        'can; 0 = not set',
+        'insensitivity.max_effort_rms',
+        Insensitivity.max_effort_rms,
+        'N m',
+        'RMS effort within which strategy insensitive leaves as little as it can',
+        '0 = not set',
         lower=0.0,
     ),
     Row(
-        name='insensitivity.max_residual',
-        default=0.0,
-        description='worst residual [rad] that strategy insensitive keeps with as little effort '
-        'as it can; 0 = not set',
+        'insensitivity.max_residual',
+        Insensitivity.max_residual,
+        'rad',
+        'worst residual that strategy insensitive keeps with as little effort as it can',
+        '0 = not set',
         lower=0.0,
     ),
     Row(
-        name='insensitivity.modes',
-        default=16,
-        description='free coefficients of the law of strategy insensitive, 6 to 48: more take '
-        'less effort, steeper at the ends, and want a shorter sampling.period',
+        'insensitivity.modes',
+        Insensitivity.modes,
+        '',
+        'free coefficients of the law of strategy insensitive, 6 to 48: more take less effort, '
+        'steeper at the ends, and want a shorter sampling.period',
     ),
 ]
 """Parameters of the planner node that concern its uncertainty."""

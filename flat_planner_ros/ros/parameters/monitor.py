@@ -18,53 +18,54 @@ from math import pi
 
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.monitor import ActuatedJoints, MonitorSettings
-from flat_planner_ros.ros.parameters.declaration import (
-    arm_of,
-    InvalidParameter,
-    model_rows,
-    Row,
-    Values,
-)
+from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
+from flat_planner_ros.ros.parameters.row import InvalidParameter, Row, Values
 
 ROWS = [
-    *model_rows(read_only=False),
+    *MODEL_ROWS,
     Row(
-        name='window',
-        default=MonitorSettings.window,
-        description='time after a motion that is judged, several periods of the oscillation [s]',
+        'window',
+        MonitorSettings.window,
+        's',
+        'time after a motion that is judged, several periods of the oscillation',
         lower=0.1,
         upper=60.0,
     ),
     Row(
-        name='amplitude_ok',
-        default=MonitorSettings.amplitude_ok,
-        description='largest amplitude at the end of a motion that is OK, above 0 [rad]',
+        'amplitude_ok',
+        MonitorSettings.amplitude_ok,
+        'rad',
+        'largest amplitude at the end of a motion that is OK, above 0',
         lower=0.0,
     ),
     Row(
-        name='amplitude_error',
-        default=MonitorSettings.amplitude_error,
-        description='largest amplitude that is no ERROR but a WARN [rad]',
+        'amplitude_error',
+        MonitorSettings.amplitude_error,
+        'rad',
+        'largest amplitude that is no ERROR but a WARN',
         lower=0.0,
     ),
     Row(
-        name='settling_band',
-        default=MonitorSettings.settling_band,
-        description='deviation of the passive joint that counts as settled, above 0 [rad]',
+        'settling_band',
+        MonitorSettings.settling_band,
+        'rad',
+        'deviation of the passive joint that counts as settled, above 0',
         lower=0.0,
     ),
     Row(
-        name='timeout',
-        default=MonitorSettings.timeout,
-        description='silence after which joint states are stale [s]',
+        'timeout',
+        MonitorSettings.timeout,
+        's',
+        'silence after which joint states are stale',
         lower=0.01,
         upper=60.0,
     ),
     Row(
-        name='actuated_joints',
-        default=MonitorSettings.actuated_joints.value,
-        description='what the actuated joints do after a motion; auto = seen from the samples',
-        choices=tuple(joints.value for joints in ActuatedJoints),
+        'actuated_joints',
+        MonitorSettings.actuated_joints,
+        '',
+        'what the actuated joints do after a motion',
+        'auto = seen from the samples',
     ),
 ]
 """All parameters of the monitor node."""

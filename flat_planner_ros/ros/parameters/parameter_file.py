@@ -25,12 +25,11 @@ from pathlib import Path
 import re
 from typing import Any
 
-from flat_planner_ros.ros.parameters.declaration import (
+from flat_planner_ros.ros.parameters.arm_model import model_defaults
+from flat_planner_ros.ros.parameters.node_parameters import refuse_unknown, Settings
+from flat_planner_ros.ros.parameters.row import (
     InvalidParameter,
-    model_defaults,
-    refuse_unknown,
     Row,
-    Settings,
     TYPE_HINTS,
     Values,
     wrong_type,

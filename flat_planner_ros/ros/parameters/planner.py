@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from math import isqrt
 
 from flat_planner_ros.core.arm import flat_map, FlatModel
@@ -23,16 +24,17 @@ from flat_planner_ros.core.insensitive import check_insensitivity
 from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.planning import JointLimits, OnViolation, PlanningOptions
 from flat_planner_ros.core.session import SessionSettings, StartSource
-from flat_planner_ros.ros.parameters.declaration import (
-    arm_of,
-    InvalidParameter,
-    model_rows,
-    Row,
-    Values,
-)
+from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
+from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row, Values
 import numpy as np
-from rclpy.parameter import Parameter
+
+
+class CommandStamp(Enum):
+    """What a command's stamp says."""
+
+    ABSOLUTE = 'absolute'
+    ZERO = 'zero'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,186 +73,185 @@ LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
 """What may be limited."""
 
 ROWS = [
-    *model_rows(read_only=False),
+    *MODEL_ROWS,
     Row(
-        name='strategy',
-        default=Strategy.MIN_CONTROL_EFFORT.value,
-        description='what the motion law minimises besides its sixth derivative',
-        choices=tuple(strategy.value for strategy in Strategy),
+        'strategy',
+        Strategy.MIN_CONTROL_EFFORT,
+        '',
+        'what the motion law minimises besides its sixth derivative',
     ),
     Row(
-        name='weights.r',
-        default=150.0,
-        description='weight of the control effort, raised to the power of 8',
+        'weights.r',
+        PlanningOptions.r,
+        '',
+        'weight of the control effort, raised to the power of 8',
         lower=0.0,
         upper=MAX_WEIGHT,
     ),
     Row(
-        name='weights.p',
-        default=17.0,
-        description='weight of the potential energy [1/s], raised to the power of 8',
+        'weights.p',
+        PlanningOptions.p,
+        '1/s',
+        'weight of the potential energy',
+        'raised to the power of 8',
         lower=0.0,
         upper=MAX_WEIGHT,
     ),
-    Row(
-        name='weights.Q',
-        default=Parameter.Type.DOUBLE_ARRAY,
-        description='36 numbers, row by row: the cost of the strategy custom',
-    ),
+    Row('weights.Q', DOUBLES, '', '36 numbers, row by row: the cost of the strategy custom'),
     *INSENSITIVITY_ROWS,
     Row(
-        name='flat_model',
-        default=FlatModel.EXACT.value,
-        description="treatment of the passive joint's damping; approximate is the paper's",
-        choices=tuple(model.value for model in FlatModel),
+        'flat_model',
+        PlanningOptions.flat_model,
+        '',
+        "treatment of the passive joint's damping",
+        "approximate is the paper's",
     ),
     Row(
-        name='compensate_friction',
-        default=False,
-        description='add to the efforts what friction.viscous and friction.coulomb take',
+        'compensate_friction',
+        PlanningOptions.compensate_friction,
+        '',
+        'add to the efforts what friction.viscous and friction.coulomb take',
     ),
     Row(
-        name='duration.default',
-        default=0.0,
-        description='duration of goals without times [s]; 0 = the shortest within limits',
+        'duration.default',
+        SessionSettings.default_duration,
+        's',
+        'duration of goals without times',
+        '0 = the shortest within limits',
         lower=0.0,
     ),
-    Row(name='duration.min', default=0.05, description='shortest duration [s]', lower=0.0),
-    Row(name='duration.max', default=600.0, description='longest duration [s]', lower=0.0),
+    Row('duration.min', SessionSettings.min_duration, 's', 'shortest duration', lower=0.0),
+    Row('duration.max', SessionSettings.max_duration, 's', 'longest duration', lower=0.0),
     Row(
-        name='limits.position_min',
-        default=Parameter.Type.DOUBLE_ARRAY,
+        'limits.position_min',
+        DOUBLES,
+        'rad',
+        'lower position limits per joint',
+        '.inf = none',
         infinite=True,
-        description='lower position limits per joint [rad]; .inf = none',
     ),
     Row(
-        name='limits.position_max',
-        default=Parameter.Type.DOUBLE_ARRAY,
+        'limits.position_max',
+        DOUBLES,
+        'rad',
+        'upper position limits per joint',
+        '.inf = none',
         infinite=True,
-        description='upper position limits per joint [rad]; .inf = none',
     ),
     Row(
-        name='limits.velocity',
-        default=Parameter.Type.DOUBLE_ARRAY,
+        'limits.velocity',
+        DOUBLES,
+        'rad/s',
+        'velocity limits per joint',
+        '.inf = none',
         infinite=True,
-        description='velocity limits per joint [rad/s]; .inf = none',
+    ),
+    Row('limits.effort', DOUBLES, 'N m', 'effort limits per joint', '.inf = none', infinite=True),
+    Row(
+        'limits.on_violation',
+        SessionSettings.on_violation,
+        '',
+        'what becomes of a motion that is too fast for the limits',
     ),
     Row(
-        name='limits.effort',
-        default=Parameter.Type.DOUBLE_ARRAY,
-        infinite=True,
-        description='effort limits per joint [N m]; .inf = none',
-    ),
-    Row(
-        name='limits.on_violation',
-        default=OnViolation.REJECT.value,
-        description='what becomes of a motion that is too fast for the limits',
-        choices=tuple(choice.value for choice in OnViolation),
-    ),
-    Row(
-        name='sampling.period',
-        default=0.005,
-        description='spacing of the points of the command [s]',
+        'sampling.period',
+        SessionSettings.period,
+        's',
+        'spacing of the points of the command',
         lower=0.0005,
         upper=0.01,
     ),
+    Row('start.source', SessionSettings.start_source, '', 'where a motion starts'),
+    Row('start.position', DOUBLES, 'rad', 'start for the source parameter'),
     Row(
-        name='start.source',
-        default=StartSource.AUTO.value,
-        description='where a motion starts',
-        choices=tuple(source.value for source in StartSource),
-    ),
-    Row(
-        name='start.position',
-        default=Parameter.Type.DOUBLE_ARRAY,
-        description='start for the source parameter [rad]',
-    ),
-    Row(
-        name='start.position_tolerance',
-        default=0.01,
-        description='largest deviation of the measured from the planned start [rad]',
+        'start.position_tolerance',
+        SessionSettings.position_tolerance,
+        'rad',
+        'largest deviation of the measured from the planned start',
         lower=0.0,
     ),
     Row(
-        name='start.velocity_tolerance',
-        default=0.1,
-        description='largest measured velocity that counts as rest [rad/s]',
+        'start.velocity_tolerance',
+        SessionSettings.velocity_tolerance,
+        'rad/s',
+        'largest measured velocity that counts as rest',
         lower=0.0,
     ),
     Row(
-        name='start.joint_state_timeout',
-        default=0.5,
-        description='age from which a joint state is stale [s]',
+        'start.joint_state_timeout',
+        SessionSettings.measurement_timeout,
+        's',
+        'age from which a joint state is stale',
         lower=0.0,
     ),
     Row(
-        name='start_delay',
-        default=0.05,
-        description='from accepting a goal without a stamp to the start of its motion [s]',
+        'start_delay',
+        SessionSettings.start_delay,
+        's',
+        'from accepting a goal without a stamp to the start of its motion',
         lower=0.0,
     ),
     Row(
-        name='replan.lookahead',
-        default=0.1,
-        description='from accepting a goal while the arm moves to the start of its motion [s]',
+        'replan.lookahead',
+        SessionSettings.lookahead,
+        's',
+        'from accepting a goal while the arm moves to the start of its motion',
         lower=0.01,
         upper=10.0,
     ),
     Row(
-        name='replan.tolerance',
-        default=0.5,
-        description='distance of a measured actuated joint from the running motion beyond which '
-        'no other takes over [rad]; 0 = any',
+        'replan.tolerance',
+        SessionSettings.replan_tolerance,
+        'rad',
+        'distance of a measured actuated joint from the running motion beyond which no other '
+        'takes over',
+        '0 = any',
         lower=0.0,
     ),
     Row(
-        name='execute',
-        default=True,
-        description='publish commands; false = plan and report only',
+        'execute',
+        SessionSettings.execute,
+        '',
+        'publish commands',
+        'false = plan and report only',
+    ),
+    Row('command.include_passive_joint', True, '', 'name the passive joint in the command'),
+    Row('command.include_effort', True, '', 'put the feed-forward effort into the command'),
+    Row(
+        'command.stamp',
+        CommandStamp.ABSOLUTE,
+        '',
+        'stamp of the command: its absolute start, or zero = on arrival',
     ),
     Row(
-        name='command.include_passive_joint',
-        default=True,
-        description='name the passive joint in the command',
-    ),
-    Row(
-        name='command.include_effort',
-        default=True,
-        description='put the feed-forward effort into the command',
-    ),
-    Row(
-        name='command.stamp',
-        default='absolute',
-        description='stamp of the command: its absolute start, or zero = on arrival',
-        choices=('absolute', 'zero'),
-    ),
-    Row(
-        name='reference_rate',
-        default=100.0,
-        description='rate of ~/reference [Hz]',
+        'reference_rate',
+        100.0,
+        'Hz',
+        'rate of ~/reference',
         lower=1.0,
         upper=1000.0,
         read_only=True,
     ),
     Row(
-        name='auto_tune',
-        default=False,
-        description='adopt each trustworthy estimate that the monitor makes after a motion',
+        'auto_tune',
+        False,
+        '',
+        'adopt each trustworthy estimate that the monitor makes after a motion',
     ),
     Row(
-        name='report_advice',
-        default=True,
-        description='say in the verdict on a goal when a little more time would pay',
+        'report_advice', True, '', 'say in the verdict on a goal when a little more time would pay'
     ),
     Row(
-        name='report_baselines',
-        default=False,
-        description='state in the verdict on a goal what simpler methods would leave behind',
+        'report_baselines',
+        False,
+        '',
+        'state in the verdict on a goal what simpler methods would leave behind',
     ),
     Row(
-        name='stream_effort',
-        default=False,
-        description='publish ~/effort_commands every sampling.period while the arm moves',
+        'stream_effort',
+        False,
+        '',
+        'publish ~/effort_commands every sampling.period while the arm moves',
     ),
 ]
 """All parameters of the planner node."""
@@ -306,7 +307,7 @@ def build(values: Values) -> PlannerSettings:
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
         replan_tolerance=values['replan.tolerance'],
-        is_stamped=values['command.stamp'] == 'absolute',
+        is_stamped=CommandStamp(values['command.stamp']) is CommandStamp.ABSOLUTE,
         execute=values['execute'],
     )
     return PlannerSettings(

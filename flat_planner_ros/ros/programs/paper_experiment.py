@@ -30,7 +30,7 @@ from flat_planner_ros.figures.paper_example import (
     Result,
     Scenario,
 )
-from flat_planner_ros.ros.parameters.declaration import EXAMPLE_ARM
+from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.wire import conversions, interfaces
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically

@@ -27,9 +27,10 @@ from flat_planner_ros.core.arm import (
     urdf_of,
     UrdfLimits,
 )
-from flat_planner_ros.ros.parameters.declaration import arm_of, LINK_ARRAYS, Values
+from flat_planner_ros.ros.parameters.arm_model import arm_of, LINK_ARRAYS
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import ROWS
+from flat_planner_ros.ros.parameters.row import Values
 from flat_planner_ros.ros.wire import interfaces
 
 LIMITS = {

@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from builtin_interfaces.msg import Time
 from flat_planner_ros.core import Strategy
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.parameters.declaration import arm_of
+from flat_planner_ros.ros.parameters.arm_model import arm_of
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.wire import conversions

@@ -22,7 +22,7 @@ from time import monotonic
 from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm
 from flat_planner_ros.core.plant import PacedArm, rollout
 from flat_planner_ros.ros.nodes.plant_node import CLOCK_START, PlantNode
-from flat_planner_ros.ros.parameters.declaration import EXAMPLE_ARM
+from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.wire import conversions
 import numpy as np
 import pytest

@@ -20,8 +20,9 @@ from flat_planner_ros.core import FlatPlannerError
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
-from flat_planner_ros.ros.parameters.declaration import EXAMPLE_ARM, InvalidParameter
+from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import interfaces
 import pytest
 
