@@ -63,12 +63,12 @@ def _run(executor: str, residual: bool, seconds: float) -> tuple[float, str]:
     source = NodeProcess('plant', SINGLE, {'publish_rate': str(RATE)})
     monitor = NodeProcess('monitor', executor, {})
     with processes(source, monitor), listener('monitor_listener') as ours:
-        plan = interfaces.of(interfaces.PLANNER, interfaces.PLAN)
+        plan = interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN)
         plans = ours.node.create_publisher(JointTrajectory, plan, interfaces.LATCHED)
         commands = ours.node.create_publisher(JointTrajectory, COMMAND, interfaces.RELIABLE)
         heard: list[bytes] = []
         if residual:
-            topic = interfaces.of(interfaces.MONITOR, interfaces.RESIDUAL)
+            topic = interfaces.topic_of(interfaces.MONITOR, interfaces.RESIDUAL)
             ours.node.create_subscription(
                 JointState, topic, heard.append, qos_profile_sensor_data, raw=True
             )

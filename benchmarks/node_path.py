@@ -23,7 +23,7 @@ from typing import Any
 from flat_planner_ros.core import Goal, GoalPoint, plan
 from flat_planner_ros.core.session import Motion, Timeline
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from measurement import duration_text, Section, Timing, timing, verdict
 import problem
 from processes import PATIENCE
@@ -93,12 +93,12 @@ class _Bench:
         # Serialised: reading the plan is the listener's work.
         self._client.create_subscription(
             JointTrajectory,
-            interfaces.of(interfaces.PLANNER, interfaces.PLAN),
+            interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN),
             lambda plan: self._plans.append((perf_counter(), plan)),
             interfaces.LATCHED,
             raw=True,
         )
-        goal = interfaces.of(interfaces.PLANNER, interfaces.GOAL)
+        goal = interfaces.topic_of(interfaces.PLANNER, interfaces.GOAL)
         self._goals = self._client.create_publisher(JointTrajectory, goal, interfaces.RELIABLE)
         for subscription in self._planner.subscriptions:
             if subscription.topic_name == self._client.resolve_topic_name(goal):
@@ -149,7 +149,7 @@ class _Bench:
 def _goal(distance: float) -> JointTrajectory:
     """Return a goal of joint 1."""
     point = JointTrajectoryPoint(
-        positions=[distance], time_from_start=conversions.duration_msg(problem.DURATION)
+        positions=[distance], time_from_start=stamps.duration_msg(problem.DURATION)
     )
     return JointTrajectory(joint_names=['joint1'], points=[point])
 

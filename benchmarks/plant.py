@@ -24,7 +24,7 @@ from flat_planner_ros.core.planning import PlanSamples
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 from measurement import Section, verdict
 import numpy as np
 import problem
@@ -42,7 +42,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-COMMAND = interfaces.of(interfaces.PLANNER, interfaces.COMMAND)
+COMMAND = interfaces.topic_of(interfaces.PLANNER, interfaces.COMMAND)
 """Where the plant listens."""
 
 FREE_SECONDS = 10.0
@@ -104,14 +104,14 @@ def _trajectory_msg(start: float, samples: PlanSamples) -> JointTrajectory:
     """Return samples as a command."""
     joints = samples.positions.shape[1]
     msg = JointTrajectory(joint_names=[f'joint{i + 1}' for i in range(joints)])
-    msg.header.stamp = conversions.time_msg(start)
+    msg.header.stamp = stamps.time_msg(start)
     msg.points = [
         JointTrajectoryPoint(
             positions=samples.positions[i].tolist(),
             velocities=samples.velocities[i].tolist(),
             accelerations=samples.accelerations[i].tolist(),
             effort=samples.efforts[i].tolist(),
-            time_from_start=conversions.duration_msg(samples.times[i]),
+            time_from_start=stamps.duration_msg(samples.times[i]),
         )
         for i in range(len(samples.times))
     ]

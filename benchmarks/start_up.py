@@ -28,9 +28,9 @@ STARTS = 5
 """Starts of each node."""
 
 SERVICES = {
-    'planner': interfaces.of(interfaces.PLANNER, interfaces.STOP),
-    'plant': interfaces.of(interfaces.PLANT, interfaces.RESET),
-    'monitor': interfaces.of(interfaces.MONITOR, interfaces.RESET),
+    'planner': interfaces.topic_of(interfaces.PLANNER, interfaces.STOP),
+    'plant': interfaces.topic_of(interfaces.PLANT, interfaces.RESET),
+    'monitor': interfaces.topic_of(interfaces.MONITOR, interfaces.RESET),
 }
 """A service of each node that can be called at any time."""
 

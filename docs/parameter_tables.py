@@ -20,15 +20,7 @@ from pathlib import Path
 import re
 import sys
 
-from flat_planner_ros.ros.parameters import (
-    monitor as monitor_parameters,
-)
-from flat_planner_ros.ros.parameters import (
-    planner as planner_parameters,
-)
-from flat_planner_ros.ros.parameters import (
-    plant as plant_parameters,
-)
+from flat_planner_ros.ros.parameters import monitor, planner, plant
 from flat_planner_ros.ros.parameters.arm_model import MODEL_ROWS
 from flat_planner_ros.ros.parameters.row import Row
 
@@ -37,6 +29,9 @@ PAGE = Path(__file__).resolve().parent / 'interfaces.md'
 
 MARKED = re.compile(r'(<!-- parameters: (\w+) -->\n).*?(<!-- end -->)', re.DOTALL)
 """A table on the page, between two comments."""
+
+TABLES = {'planner': planner.ROWS, 'plant': plant.ROWS, 'monitor': monitor.ROWS}
+"""Parameters by node."""
 
 HEADER = '| parameter | default | allowed | meaning |\n|---|---|---|---|\n'
 """First lines of a table."""
@@ -54,16 +49,11 @@ def _table(name: str) -> str:
 
 def _rows(name: str) -> Iterator[Row]:
     """Return the rows of a node that are not the model's, or those of the model."""
-    modules = {
-        'planner': planner_parameters,
-        'plant': plant_parameters,
-        'monitor': monitor_parameters,
-    }
     if name == 'model':
         yield from MODEL_ROWS
         return
     shared = {row.name for row in MODEL_ROWS}
-    yield from (row for row in modules[name].ROWS if row.name not in shared)
+    yield from (row for row in TABLES[name] if row.name not in shared)
 
 
 def _line(row: Row) -> str:

@@ -20,7 +20,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
@@ -47,7 +47,7 @@ NOT_YET = ('START_STATE_UNKNOWN', 'START_STATE_STALE', 'NOT_AT_REST')
 def goal(positions, duration=1.0):
     """Return a goal for joint 1, or for the first joints."""
     point = JointTrajectoryPoint(positions=np.ravel(positions).astype(float).tolist())
-    point.time_from_start = conversions.duration_msg(duration)
+    point.time_from_start = stamps.duration_msg(duration)
     names = [f'joint{i + 1}' for i in range(len(point.positions))]
     return JointTrajectory(joint_names=names, points=[point])
 
@@ -59,7 +59,7 @@ def values(msg):
 
 def stamp(msg):
     """Return when a message is stamped [s]."""
-    return conversions.seconds(msg.header.stamp)
+    return stamps.seconds(msg.header.stamp)
 
 
 def table(trajectory, field):
@@ -170,7 +170,7 @@ class World(Observer):
         """End programs by SIGKILL; return when [s]."""
         for name in programs:
             self.processes.pop(name).kill()
-        return conversions.seconds(self.graph.probe.get_clock().now().to_msg())
+        return stamps.now(self.graph.probe.get_clock())
 
     def answers(self):
         """Return the values of all verdicts."""

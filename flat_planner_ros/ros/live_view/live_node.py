@@ -27,7 +27,7 @@ from flat_planner_ros.ros.live_view.feed import Feed
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
 from flat_planner_ros.ros.parameters.row import InvalidParameter
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -80,10 +80,10 @@ ROWS = {
 """What they may be."""
 
 SERVICES = {
-    'replan': interfaces.of(interfaces.PLANNER, interfaces.REPLAN),
-    'stop': interfaces.of(interfaces.PLANNER, interfaces.STOP),
-    'adopt': interfaces.of(interfaces.PLANNER, interfaces.ADOPT),
-    'reset': interfaces.of(interfaces.PLANT, interfaces.RESET),
+    'replan': interfaces.topic_of(interfaces.PLANNER, interfaces.REPLAN),
+    'stop': interfaces.topic_of(interfaces.PLANNER, interfaces.STOP),
+    'adopt': interfaces.topic_of(interfaces.PLANNER, interfaces.ADOPT),
+    'reset': interfaces.topic_of(interfaces.PLANT, interfaces.RESET),
 }
 """Services that the page calls, by the names of its buttons."""
 
@@ -126,7 +126,7 @@ class LiveNode(Node):
         self._listen()
         self._goals = self.create_publisher(
             JointTrajectory,
-            interfaces.of(interfaces.PLANNER, interfaces.GOAL),
+            interfaces.topic_of(interfaces.PLANNER, interfaces.GOAL),
             interfaces.RELIABLE,
         )
         self._triggers = {
@@ -166,22 +166,24 @@ class LiveNode(Node):
 
     def _listen(self) -> None:
         """Subscribe to all that the page shows."""
-        planner, monitor, of = interfaces.PLANNER, interfaces.MONITOR, interfaces.of
-        latched, history = interfaces.LATCHED, interfaces.LATCHED_HISTORY
+        reference = interfaces.topic_of(interfaces.PLANNER, interfaces.REFERENCE)
+        residual = interfaces.topic_of(interfaces.MONITOR, interfaces.RESIDUAL)
         for stream, topic in (
             (MEASURED, interfaces.JOINT_STATES),
-            (REFERENCE, of(planner, interfaces.REFERENCE)),
-            (RESIDUAL, of(monitor, interfaces.RESIDUAL)),
+            (REFERENCE, reference),
+            (RESIDUAL, residual),
         ):
             self.create_subscription(
                 JointState, topic, self._receiver(stream), interfaces.SENSOR_DATA, raw=True
             )
-        for kind, topic, take, quality in (
-            (JointTrajectory, of(planner, interfaces.PLAN), self._on_plan, latched),
-            (DiagnosticArray, of(planner, interfaces.STATUS), self._on_status, history),
-            (DiagnosticArray, of(monitor, interfaces.REPORT), self._on_report, latched),
-        ):
-            self.create_subscription(kind, topic, take, quality)
+        plan = interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN)
+        status = interfaces.topic_of(interfaces.PLANNER, interfaces.STATUS)
+        report = interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
+        self.create_subscription(JointTrajectory, plan, self._on_plan, interfaces.LATCHED)
+        self.create_subscription(
+            DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY
+        )
+        self.create_subscription(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
 
     def _receiver(self, stream: str) -> Callable[[bytes], None]:
         """Return the callback of a stream, which reads only what will be shown."""
@@ -196,7 +198,7 @@ class LiveNode(Node):
 
     def _on_state(self, stream: str, msg: JointState) -> None:
         """Add a row: time, positions, velocities and efforts, NaN where unknown."""
-        if not conversions.is_stamped(msg):
+        if not stamps.is_stamped(msg):
             msg.header.stamp = self.get_clock().now().to_msg()
         if self._reader is None or not self._joints:
             self._reader = self._use_joints(msg.name)
@@ -232,7 +234,7 @@ class LiveNode(Node):
         for status in msg.status:
             self._verdicts.appendleft(
                 {
-                    'time': conversions.seconds(msg.header.stamp),
+                    'time': stamps.seconds(msg.header.stamp),
                     'level': LEVELS.get(status.level, 'stale'),
                     'state': _values(status).get('state', ''),
                     'text': status.message[:TEXT_LIMIT],
@@ -317,7 +319,7 @@ class LiveNode(Node):
             raise InvalidRequest(f'a goal needs {len(joints)} positions, {", ".join(joints)}')
         if not self._goals.get_subscription_count():
             raise InvalidRequest('no planner is there to hear the goal')
-        time = conversions.duration_msg(_number(duration, 'duration', lower=0.0, upper=1e6))
+        time = stamps.duration_msg(_number(duration, 'duration', lower=0.0, upper=1e6))
         point = JointTrajectoryPoint(
             positions=[
                 _number(value, name, lower=-1e9, upper=1e9)

@@ -15,7 +15,7 @@
 """Stream of efforts for executors that take one effort after the other, not a trajectory."""
 
 from flat_planner_ros.core.session import PlannerSession
-from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire import conversions, stamps
 import numpy as np
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -72,7 +72,7 @@ class EffortStream:
 
     def _on_tick(self) -> None:
         """Publish the effort planned for the middle of the coming period."""
-        now = conversions.seconds(self._node.get_clock().now().to_msg())
+        now = stamps.now(self._node.get_clock())
         is_moving = self._session.moves(now, now + self._period)
         samples = self._session.reference(now + 0.5 * self._period) if is_moving else None
         if samples is not None:

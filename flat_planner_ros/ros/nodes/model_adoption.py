@@ -54,7 +54,7 @@ class ModelAdoption:
         self._node = node
         self._settings, self._last_start, self._announce = settings, last_start, announce
         self._tuner = ModelTuner()
-        report = interfaces.of(interfaces.MONITOR, interfaces.REPORT)
+        report = interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
         node.create_subscription(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
         node.create_service(Trigger, interfaces.ADOPT, self._on_adopt)
 

@@ -35,8 +35,7 @@ from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.monitor import build, ROWS
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.row import InvalidParameter
-from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
-from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -75,19 +74,19 @@ class MonitorNode(Node):
         self._residual = publish(JointState, interfaces.RESIDUAL, interfaces.RELIABLE)
         self._reports = publish(DiagnosticArray, interfaces.REPORT, interfaces.LATCHED)
         self._health = publish(DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE)
-        plan = interfaces.of(interfaces.PLANNER, interfaces.PLAN)
+        plan = interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN)
         listen = self.create_subscription
         # As bytes: the points of a long plan would take a second to become Python objects.
         listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED, raw=True)
         listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
-        status = interfaces.of(interfaces.PLANNER, interfaces.STATUS)
+        status = interfaces.topic_of(interfaces.PLANNER, interfaces.STATUS)
         listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
         self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._steady = steady
-        self._ticked = steady.now()
+        self._ticked = stamps.now(steady)
         self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
         self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
@@ -104,7 +103,7 @@ class MonitorNode(Node):
 
     def _now(self) -> float:
         """Return the node's time [s]."""
-        return conversions.seconds(self.get_clock().now().to_msg())
+        return stamps.now(self.get_clock())
 
     def _forget(self) -> None:
         """Wait for a plan, as at the start."""
@@ -135,7 +134,7 @@ class MonitorNode(Node):
         """Take a sample and tell how far it is from the plan."""
         if self._reader is None:
             return
-        if not conversions.is_stamped(msg):
+        if not stamps.is_stamped(msg):
             msg.header.stamp = self.get_clock().now().to_msg()
         try:
             sample = self._reader.read(msg)
@@ -168,11 +167,13 @@ class MonitorNode(Node):
 
     def _on_tick(self) -> None:
         """Notice silence, unless the node itself has been busy: samples may be waiting then."""
-        before, self._ticked = self._ticked, self._steady.now()
-        elapsed = (self._ticked - before).nanoseconds / NANOSECONDS
+        steady = stamps.now(self._steady)
+        elapsed = steady - self._ticked
+        self._ticked = steady
         if elapsed > LATE_TICK:
             return
-        now, plan = self._stamps.now(self._now()), self._plan
+        now = self._stamps.now(self._now())
+        plan = self._plan
         # The node's own time would end the watch of a plan that is of another clock.
         is_known = self._stamps.stamp is not None
         if plan is not None and (is_known or abs(now - plan.start) < SAME_CLOCK):

@@ -30,7 +30,7 @@ from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
-from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
@@ -104,7 +104,7 @@ class PlannerNode(Node):
 
     def _now(self) -> float:
         """Return the present time [s]."""
-        return conversions.seconds(self.get_clock().now().to_msg())
+        return stamps.now(self.get_clock())
 
     def _apply(self, settings: PlannerSettings) -> None:
         """Plan the next goals with changed parameters."""

@@ -25,8 +25,7 @@ from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
 from flat_planner_ros.ros.parameters.row import InvalidParameter
-from flat_planner_ros.ros.wire import conversions, interfaces
-from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
+from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
@@ -81,7 +80,7 @@ class PlantNode(Node):
             CommandInput.TRAJECTORY: (interfaces.COMMAND, JointTrajectory, self._on_trajectory),
             CommandInput.EFFORT: (interfaces.EFFORT_COMMANDS, Float64MultiArray, self._on_effort),
         }[self._settings.command_input]
-        name = interfaces.of(interfaces.PLANNER, topic)
+        name = interfaces.topic_of(interfaces.PLANNER, topic)
         # As bytes: the points of a long command would take a second to become Python objects.
         raw = callback == self._on_trajectory
         self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)
@@ -139,10 +138,10 @@ class PlantNode(Node):
         """Go on to the present and publish what was passed."""
         settings = self._settings
         if settings.publish_clock:
-            wall = self._steady.now().nanoseconds / NANOSECONDS
+            wall = stamps.now(self._steady)
             samples = self._arm.lead(wall, settings.real_time_factor)
         else:
-            samples = self._arm.follow(conversions.seconds(self.get_clock().now().to_msg()))
+            samples = self._arm.follow(stamps.now(self.get_clock()))
         for sample in samples:
             self._publish(sample)
 

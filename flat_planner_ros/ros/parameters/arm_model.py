@@ -29,12 +29,10 @@ from flat_planner_ros.ros.parameters.row import (
 )
 from rclpy.parameter import Parameter
 
-JOINTS = Row(
-    'joints', NAMES, '', 'joint names in kinematic order, the passive one last', read_only=True
-)
-
 MODEL_ROWS = [
-    JOINTS,
+    Row(
+        'joints', NAMES, '', 'joint names in kinematic order, the passive one last', read_only=True
+    ),
     Row('model.inertia_star', DOUBLES, 'kg m^2', 'reduced inertias I*_{n-1} and I*_n'),
     Row('model.link_length', DOUBLES, 'm', 'lengths of the links'),
     Row('model.link_com', DOUBLES, 'm', 'centres of mass of the links from their joints'),

@@ -27,7 +27,7 @@ from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import MonitorSettings
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
-from flat_planner_ros.ros.programs.extras import explain_missing
+from flat_planner_ros.ros.programs.command_line import explain_missing
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 from flat_planner_ros.ros.wire.message_types import message_class
 from rclpy.serialization import deserialize_message
@@ -192,8 +192,8 @@ def _recorded_reports(
     recording: 'Recording', sources: 'Sources'
 ) -> dict[float, Mapping[str, Any]]:
     """Return the values of the reports that the monitor gave at the time, by start of motion."""
-    namespace = sources.plan.removesuffix(interfaces.of(interfaces.PLANNER, interfaces.PLAN))
-    topic = namespace + interfaces.of(interfaces.MONITOR, interfaces.REPORT)
+    namespace = sources.plan.removesuffix(interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN))
+    topic = namespace + interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
     reports: dict[float, Mapping[str, Any]] = {}
     for entry in recording.entries({topic}):
         msg = deserialize_message(entry.message, message_class(entry.kind))

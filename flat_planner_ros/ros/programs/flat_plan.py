@@ -37,7 +37,7 @@ from flat_planner_ros.core.session import (
 )
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import build, ROWS
-from flat_planner_ros.ros.programs.extras import explain_missing
+from flat_planner_ros.ros.programs.command_line import explain_missing
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 
 EXAMPLES = """

@@ -23,7 +23,7 @@ import sys
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.ros.live_view.live_node import LiveNode
 from flat_planner_ros.ros.nodes.node_runner import run
-from flat_planner_ros.ros.programs.extras import explain_missing, split_arguments
+from flat_planner_ros.ros.programs.command_line import explain_missing, split_arguments
 
 HOST, PORT = '127.0.0.1', 8765
 """Where the page is, by default: for browsers of this machine only."""

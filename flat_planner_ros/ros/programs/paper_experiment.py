@@ -31,7 +31,7 @@ from flat_planner_ros.figures.paper_example import (
     Scenario,
 )
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
@@ -122,9 +122,9 @@ class Experimenter(Node):
         self._verdicts: list[DiagnosticArray] = []
         self._reports: list[DiagnosticArray] = []
         planner, plant, monitor = OURS
-        goal, plan = (interfaces.of(planner, t) for t in (interfaces.GOAL, interfaces.PLAN))
-        status = interfaces.of(planner, interfaces.STATUS)
-        report = interfaces.of(monitor, interfaces.REPORT)
+        goal, plan = (interfaces.topic_of(planner, t) for t in (interfaces.GOAL, interfaces.PLAN))
+        status = interfaces.topic_of(planner, interfaces.STATUS)
+        report = interfaces.topic_of(monitor, interfaces.REPORT)
         self._goals = self.create_publisher(JointTrajectory, goal, interfaces.RELIABLE)
         for kind, name, heard, quality in (
             (JointState, interfaces.JOINT_STATES, self._states, RECORDING),
@@ -137,14 +137,14 @@ class Experimenter(Node):
             name: self.create_client(SetParametersAtomically, f'{name}/set_parameters_atomically')
             for name in OURS
         }
-        self._reset = self.create_client(Trigger, interfaces.of(plant, interfaces.RESET))
-        self._adopt = self.create_client(Trigger, interfaces.of(planner, interfaces.ADOPT))
+        self._reset = self.create_client(Trigger, interfaces.topic_of(plant, interfaces.RESET))
+        self._adopt = self.create_client(Trigger, interfaces.topic_of(planner, interfaces.ADOPT))
 
     def wait_for_nodes(self) -> None:
         """Wait until all three nodes answer and hear each other."""
         planner, plant, monitor = OURS
-        command = interfaces.of(planner, interfaces.COMMAND)
-        plan = interfaces.of(planner, interfaces.PLAN)
+        command = interfaces.topic_of(planner, interfaces.COMMAND)
+        plan = interfaces.topic_of(planner, interfaces.PLAN)
 
         def are_listening() -> bool:
             listeners = [
@@ -263,7 +263,7 @@ class Experimenter(Node):
         """Send the goal until the planner has seen the reset; return the motion's start [s]."""
         deadline = monotonic() + PATIENCE
         while True:
-            start = conversions.seconds(self._states[-1].header.stamp) + self._lead
+            start = stamps.seconds(self._states[-1].header.stamp) + self._lead
             self._verdicts.clear()
             self._goals.publish(_goal(start))
             self._await(lambda: bool(self._verdicts), 'no verdict on the goal')
@@ -337,10 +337,10 @@ def _complaint(names: Sequence[str]) -> str:
 def _goal(start: float) -> JointTrajectory:
     """Return the goal of the example with its absolute start [s]."""
     point = JointTrajectoryPoint(
-        positions=[float(GOAL_ANGLE)], time_from_start=conversions.duration_msg(DURATION)
+        positions=[float(GOAL_ANGLE)], time_from_start=stamps.duration_msg(DURATION)
     )
     goal = JointTrajectory(joint_names=[EXAMPLE_ARM['joints'][0]], points=[point])
-    goal.header.stamp = conversions.time_msg(start)
+    goal.header.stamp = stamps.time_msg(start)
     return goal
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import sys
 
 from flat_planner_ros.ros.nodes.node_runner import run
-from flat_planner_ros.ros.programs.extras import explain_missing, split_arguments
+from flat_planner_ros.ros.programs.command_line import explain_missing, split_arguments
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -131,7 +131,7 @@ class RecorderNode(Node):
         self._stale = set(OURS)
         topics = dict(SHARED)
         for node, private in OURS.items():
-            topics |= {interfaces.of(node, name): value for name, value in private.items()}
+            topics |= {interfaces.topic_of(node, name): value for name, value in private.items()}
         for name, wanted in topics.items():
             self._wanted[self.resolve_topic_name(name)] = wanted
         # Also where a simulated clock stands still.

@@ -29,8 +29,8 @@ from flat_planner_ros.core.monitor import (
 )
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.recording.recording import Entry, Recording
-from flat_planner_ros.ros.wire import conversions
-from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, of, PLAN, PLANNER
+from flat_planner_ros.ros.wire import conversions, stamps
+from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, PLAN, PLANNER, topic_of
 from flat_planner_ros.ros.wire.message_types import message_class
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
@@ -102,8 +102,9 @@ def find_sources(
         There is no such topic, or more than one.
 
     """
+    usual = topic_of(PLANNER, PLAN)
     return Sources(
-        plan=_find(recording, JOINT_TRAJECTORY, plan, namespace, of(PLANNER, PLAN), '--plan'),
+        plan=_find(recording, JOINT_TRAJECTORY, plan, namespace, usual, '--plan'),
         joint_states=_find(
             recording, JOINT_STATE, joint_states, namespace, JOINT_STATES, '--joint-states'
         ),
@@ -112,7 +113,7 @@ def find_sources(
 
 def recorded_settings(recording: Recording, sources: Sources) -> list[tuple[int, MonitorSettings]]:
     """Return the monitor's settings as recorded, each with the time from which it held [ns]."""
-    namespace = sources.plan.removesuffix('/' + of(PLANNER, PLAN))
+    namespace = sources.plan.removesuffix('/' + topic_of(PLANNER, PLAN))
     known = {row.name for row in monitor_parameters.ROWS}
     settings = []
     for time, node, text in recording.parameters:
@@ -167,8 +168,8 @@ class _Player:
     def take(self, entry: Entry) -> None:
         """Take a message; one that cannot be used is left out, as in the node."""
         msg = deserialize_message(entry.message, message_class(entry.kind))
-        if not conversions.is_stamped(msg):
-            msg.header.stamp = conversions.time_msg(entry.time / NANOSECONDS)
+        if not stamps.is_stamped(msg):
+            msg.header.stamp = stamps.time_msg(entry.time / NANOSECONDS)
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
         with suppress(FlatPlannerError):
             take(msg)

@@ -18,14 +18,14 @@ from array import array
 from collections.abc import Sequence
 from typing import TypeVar
 
-from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidRequest, JointSample
 from flat_planner_ros.core.monitor import PlannedMotion, Residual, select
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
 from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
+from flat_planner_ros.ros.wire import stamps
 from flat_planner_ros.ros.wire.point_reader import FIELDS, PointTable, read_points
-from flat_planner_ros.ros.wire.point_writer import NANOSECONDS, trajectory_bytes
+from flat_planner_ros.ros.wire.point_writer import trajectory_bytes
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
@@ -37,23 +37,6 @@ Message = TypeVar('Message')
 
 MAX_GOAL_BYTES = 100_000
 """Longest goal that is read; 51 points of seven joints take a tenth of it."""
-
-
-def seconds(time: Time | Duration) -> float:
-    """Return a stamp or a duration in seconds."""
-    return float(time.sec + time.nanosec / NANOSECONDS)
-
-
-def time_msg(time: float) -> Time:
-    """Return the stamp of an absolute time [s]."""
-    sec, nanosec = _split(time)
-    return Time(sec=sec, nanosec=nanosec)
-
-
-def duration_msg(duration: float) -> Duration:
-    """Return the message of a duration [s]."""
-    sec, nanosec = divmod(round(duration * NANOSECONDS), NANOSECONDS)
-    return Duration(sec=sec, nanosec=nanosec)
 
 
 def message_of(data: bytes, message_type: type[Message]) -> Message:
@@ -115,10 +98,11 @@ def points_of_message(msg: JointTrajectory) -> PointTable:
             fields[field] = np.array(rows, dtype=float).reshape(len(rows), width)
         else:
             misfits[field] = f'point {odd} has {len(rows[odd])} {field} for {count} joints'
+    times = [stamps.seconds(point.time_from_start) for point in msg.points]
     return PointTable(
         joint_names=tuple(msg.joint_names),
-        stamp=seconds(msg.header.stamp),
-        times=np.array([seconds(point.time_from_start) for point in msg.points], dtype=float),
+        stamp=stamps.seconds(msg.header.stamp),
+        times=np.array(times, dtype=float),
         fields=fields,
         misfits=misfits,
     )
@@ -137,7 +121,7 @@ def goal_from_trajectory(msg: JointTrajectory) -> Goal:
     check_point_count(len(msg.points))
     points = tuple(
         GoalPoint(
-            time=seconds(point.time_from_start),
+            time=stamps.seconds(point.time_from_start),
             positions=tuple(point.positions),
             velocities=tuple(point.velocities),
             accelerations=tuple(point.accelerations),
@@ -204,17 +188,11 @@ class JointStateReader:
         if len(msg.position) != count:
             raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
         return JointSample(
-            time=seconds(msg.header.stamp),
+            time=stamps.seconds(msg.header.stamp),
             positions=np.frombuffer(msg.position)[self._indices],
             velocities=_optional(msg.velocity, count, self._indices),
             efforts=_optional(msg.effort, count, self._indices),
         )
-
-
-def is_stamped(msg: JointState) -> bool:
-    """Return whether the message says when it was measured."""
-    stamp = msg.header.stamp
-    return bool(stamp.sec or stamp.nanosec)
 
 
 def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
@@ -312,7 +290,7 @@ def command_bytes(
         tables.append(track.efforts)
     start = track.start if absolute_stamp else 0.0
     tables = [table[:, :count] for table in tables]
-    return trajectory_bytes(joints[:count], _split(start), track.times, tables)
+    return trajectory_bytes(joints[:count], stamps.sec_and_nanosec(start), track.times, tables)
 
 
 def flat_plan_bytes(track: Track) -> bytes:
@@ -320,7 +298,7 @@ def flat_plan_bytes(track: Track) -> bytes:
     flat = track.flat
     names = [f'y{k + 1}' for k in range(len(flat))] + ['y1_d3']
     tables = [np.vstack([flat[:, k], flat[0, k + 3]]).T for k in range(3)]
-    return trajectory_bytes(names, _split(track.start), track.times, tables)
+    return trajectory_bytes(names, stamps.sec_and_nanosec(track.start), track.times, tables)
 
 
 def effort_msg(efforts: FloatArray) -> Float64MultiArray:
@@ -357,18 +335,10 @@ def _joint_state_msg(
 ) -> JointState:
     """Return a joint state with full arrays."""
     msg = JointState(name=list(joints))
-    msg.header.stamp = time_msg(time)
+    msg.header.stamp = stamps.time_msg(time)
     msg.position, msg.velocity = _doubles(position), _doubles(velocity)
     msg.effort = _doubles(effort)
     return msg
-
-
-def _split(time: float) -> tuple[int, int]:
-    """Return an absolute time [s] in seconds and nanoseconds."""
-    # Split first: a product of some 1e18 would round off the last hundred nanoseconds.
-    sec, fraction = divmod(time, 1.0)
-    carry, nanosec = divmod(round(fraction * NANOSECONDS), NANOSECONDS)
-    return int(sec) + carry, nanosec
 
 
 def _doubles(values: FloatArray) -> 'array[float]':
@@ -378,7 +348,7 @@ def _doubles(values: FloatArray) -> 'array[float]':
 
 def _stamp(msg: JointTrajectory | JointState) -> float | None:
     """Return the absolute time of a header, None for the stamp 0."""
-    return seconds(msg.header.stamp) or None
+    return stamps.seconds(msg.header.stamp) or None
 
 
 def _first_line(error: Exception) -> str:

@@ -33,8 +33,8 @@ from flat_planner_ros.core.planning import (
     residual_of_plan,
 )
 from flat_planner_ros.core.session import Ended, Goal, Motion, Outcome
-from flat_planner_ros.ros.wire.conversions import time_msg
 from flat_planner_ros.ros.wire.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
+from flat_planner_ros.ros.wire.stamps import time_msg
 
 ECHO_LENGTH = 16
 """Most entries of a goal's list that a verdict repeats."""

@@ -107,6 +107,6 @@ ERROR_CODES = {
 """Codes in `~/status`; -1 to -3 as in control_msgs/FollowJointTrajectory."""
 
 
-def of(node: str, topic: str) -> str:
+def topic_of(node: str, topic: str) -> str:
     """Return the name by which another node of ours finds a private topic."""
     return topic.replace('~', node, 1)

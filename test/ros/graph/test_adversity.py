@@ -21,7 +21,7 @@ import resource
 import signal
 from time import monotonic
 
-from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
 from ros.world import ANSWERS, goal, stamp, values, World
@@ -71,7 +71,7 @@ def test_parameters_changed_in_a_motion_are_for_the_next_one(graph):
     command = world.commands[-1]
     assert world.amplitude() < 1e-5 or world.is_said_to_be_late()
     assert world.commands[-1] is command
-    at = [stamp(command) + conversions.seconds(p.time_from_start) for p in command.points]
+    at = [stamp(command) + stamps.seconds(p.time_from_start) for p in command.points]
     planned = [p.effort[0] for p in command.points]
     for state in world.states:
         if world.begin <= stamp(state) <= world.end and not world.is_said_to_be_late():
@@ -140,7 +140,7 @@ def test_a_clock_that_stops_stops_the_motion_and_ends_it_when_it_goes_on(graph):
 
         def has_followed():
             # Again and again: nodes hear a clock by best effort, and the first of it may be lost.
-            graph.publish('/clock', Clock(clock=conversions.time_msg(now)), readers=3)
+            graph.publish('/clock', Clock(clock=stamps.time_msg(now)), readers=3)
             return world.states and stamp(world.states[-1]) > now - 0.03
 
         graph.expect(has_followed, f'the arm at {now}')

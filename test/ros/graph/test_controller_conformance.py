@@ -25,7 +25,7 @@ from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.parameters.arm_model import arm_of
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import ROWS
-from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
 from ros.world import goal
@@ -74,7 +74,7 @@ class Session:
     def advance(self, step):
         """Let time go on, until the planner knows."""
         self.now += step
-        self.graph.publish('/clock', Clock(clock=conversions.time_msg(self.now)))
+        self.graph.publish('/clock', Clock(clock=stamps.time_msg(self.now)))
         self.graph.expect(
             lambda: self.planner.get_clock().now().nanoseconds >= round(self.now * 1e9),
             'the time',
@@ -113,8 +113,8 @@ def test_random_goals_give_commands_that_the_controller_plays(graph, form, strat
         assert msg.points[0].positions[0] == 0.5
         assert msg.points[-1].positions[0] == pytest.approx(angle, abs=1e-9)
         end = msg.points[-1].time_from_start
-        assert conversions.seconds(end) == pytest.approx(duration, abs=1e-9)
-        times = np.array([conversions.seconds(point.time_from_start) for point in msg.points])
+        assert stamps.seconds(end) == pytest.approx(duration, abs=1e-9)
+        times = np.array([stamps.seconds(point.time_from_start) for point in msg.points])
         assert np.ptp(np.diff(times)) < 3e-9  # even, also where the period does not divide
         has_effort = [len(point.effort) > 0 for point in msg.points]
         assert all(has_effort) == any(has_effort) == form.startswith('effort')

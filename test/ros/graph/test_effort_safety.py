@@ -16,7 +16,7 @@
 
 from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from ros.world import ask, COMMAND, EVERY_VERDICT, goal, move, Observer, stamp, START_DELAY, STATUS
@@ -44,7 +44,7 @@ class Watched(Observer):
         """Start a plant and wait until it shows itself and hears commands."""
         # One that was killed stays in the graph for a while.
         listeners = self.graph.probe.count_subscribers(COMMAND)
-        now = conversions.seconds(self.graph.probe.get_clock().now().to_msg())
+        now = stamps.now(self.graph.probe.get_clock())
         self.plant = self.graph.start('plant_node', *self.arguments)
         self.graph.expect(
             lambda: self.states and stamp(self.states[-1]) > now, 'joint states of a new plant'
@@ -125,11 +125,11 @@ def test_a_command_sent_again_after_a_restart_is_refused_as_elsewhere(graph):
 @pytest.mark.parametrize('late_by', [1.001, 2.0, 1e9])
 def test_a_command_older_than_its_own_length_is_never_played(graph, late_by):
     watched = Watched(graph)
-    point = JointTrajectoryPoint(time_from_start=conversions.duration_msg(DURATION), effort=[0.0])
+    point = JointTrajectoryPoint(time_from_start=stamps.duration_msg(DURATION), effort=[0.0])
     first = JointTrajectoryPoint(effort=[1e-3])
     message = JointTrajectory(joint_names=['joint1'], points=[first, point])
-    now = conversions.seconds(watched.planner.get_clock().now().to_msg())
-    message.header.stamp = conversions.time_msg(max(1e-9, now - late_by * DURATION))
+    now = stamps.now(watched.planner.get_clock())
+    message.header.stamp = stamps.time_msg(max(1e-9, now - late_by * DURATION))
     graph.publish(COMMAND, message)
     graph.expect(lambda: graph.logged('trajectory ignored: it ended at'), 'a refusal')
     watched.wait_until(stamp(watched.states[-1]) + 0.2)

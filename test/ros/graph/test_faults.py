@@ -20,7 +20,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
@@ -37,7 +37,7 @@ SIMULATED = {'use_sim_time': True}
 def state(time, position=(0.0, 0.0), velocity=(0.0, 0.0), names=('joint1', 'joint2')):
     """Return a joint state."""
     msg = JointState(name=list(names), position=list(position), velocity=list(velocity))
-    msg.header.stamp = conversions.time_msg(time)
+    msg.header.stamp = stamps.time_msg(time)
     return msg
 
 
@@ -61,7 +61,7 @@ class Timed:
     def show(self, time):
         """Publish a time, once all hear it, and let it be worked off."""
         self.time = time
-        self.graph.publish('/clock', Clock(clock=conversions.time_msg(time)), readers=self.count)
+        self.graph.publish('/clock', Clock(clock=stamps.time_msg(time)), readers=self.count)
 
     def run(self, until, step=0.02):
         """Let time go on until the plant has shown it."""
@@ -149,7 +149,7 @@ def test_no_motion_starts_from_broken_joint_states(graph, name):
 def test_a_late_joint_state_does_not_take_the_place_of_a_newer_one(graph):
     planner = graph.create(PlannerNode)
     plans = graph.collect(JointTrajectory, '/flat_planner/plan')
-    now = conversions.seconds(graph.probe.get_clock().now().to_msg())
+    now = stamps.now(graph.probe.get_clock())
     graph.publish(STATES, state(now, (0.5, 0.0)))
     graph.publish(STATES, state(now - 0.1, (-0.5, 0.0)))
     for _ in range(3):  # until both have been worked off

@@ -18,7 +18,7 @@ import json
 from math import pi
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from ros.relay import Faults, Relay
@@ -86,7 +86,7 @@ class Lossy(Observer):
 
 def played(command, times):
     """Return the efforts of joint 1 that a command asks for [N m]."""
-    at = [stamp(command) + conversions.seconds(p.time_from_start) for p in command.points]
+    at = [stamp(command) + stamps.seconds(p.time_from_start) for p in command.points]
     return np.interp(times, at, [p.effort[0] for p in command.points], left=0.0, right=0.0)
 
 

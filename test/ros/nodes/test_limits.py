@@ -18,7 +18,7 @@ from math import inf, pi
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from ros.world import goal, STATUS, table, values
@@ -144,7 +144,7 @@ def test_a_goal_without_times_takes_the_shortest_duration(graph):
     graph.expect(lambda: planner.plans, 'the plan')
     assert_obeys(planner)
     last = planner.plans[-1].points[-1].time_from_start
-    assert conversions.seconds(last) == pytest.approx(duration, abs=1e-9)
+    assert stamps.seconds(last) == pytest.approx(duration, abs=1e-9)
     status, values = planner.send(duration=duration * (1.0 - 1e-3))
     assert values['error_name'] in ('EFFORT_LIMIT', 'VELOCITY_LIMIT')
     pose = JointState(name=['joint1'], position=[1.0])

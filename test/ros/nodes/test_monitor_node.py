@@ -30,7 +30,7 @@ from flat_planner_ros.core.monitor import (
     VibrationMonitor,
 )
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
-from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
@@ -66,9 +66,9 @@ RESIDUAL, REPORT, RESET = '/flat_monitor/residual', '/flat_monitor/report', '/fl
 def plan_msg(start=START, duration=DURATION, goal=GOAL, joints=JOINTS):
     """Return a cubic rest-to-rest motion of joint 1."""
     msg = JointTrajectory(joint_names=list(joints))
-    msg.header.stamp = conversions.time_msg(start)
+    msg.header.stamp = stamps.time_msg(start)
     for s in np.linspace(0.0, 1.0, 51).tolist():
-        point = JointTrajectoryPoint(time_from_start=conversions.duration_msg(s * duration))
+        point = JointTrajectoryPoint(time_from_start=stamps.duration_msg(s * duration))
         point.positions = [goal * s**2 * (3 - 2 * s), 0.0]
         point.velocities = [goal * 6 * s * (1 - s) / duration, 0.0]
         msg.points.append(point)
@@ -85,7 +85,7 @@ def state_msg(time, start=START, goal=GOAL, amplitude=AMPLITUDE):
     """Return the planned state until, a free oscillation of joint 2 after the end."""
     s = min(max((time - start) / DURATION, 0.0), 1.0)
     msg = JointState(name=list(JOINTS))
-    msg.header.stamp = conversions.time_msg(time)
+    msg.header.stamp = stamps.time_msg(time)
     msg.position = [goal * s**2 * (3 - 2 * s), swing(time - start - DURATION, amplitude)]
     msg.velocity = [goal * 6 * s * (1 - s) / DURATION, 0.0]
     msg.effort = [sin(2 * pi * s), nan]
@@ -244,7 +244,7 @@ def test_the_residual_is_against_the_plan_and_then_against_the_final_pose(bench)
     bench.feed(START + DURATION + 0.2, form=shifted)
     for index, residual in enumerate(bench.residuals):
         time = START + index / RATE
-        assert residual.header.stamp == conversions.time_msg(time)
+        assert residual.header.stamp == stamps.time_msg(time)
         assert residual.header.frame_id == 'base_link'
         assert residual.name == list(JOINTS)
         wanted = shift + (0.0, swing(time - START - DURATION))
@@ -308,7 +308,7 @@ def test_joint_states_that_stop_make_a_stale_report(graph):
 
 def test_a_motion_that_nobody_measures_makes_a_stale_report(graph):
     bench = Bench(graph, PARAMETERS | {'timeout': 0.2})
-    start = conversions.seconds(bench.node.get_clock().now().to_msg()) + 0.1
+    start = stamps.now(bench.node.get_clock()) + 0.1
     bench.plan(plan_msg(start))
     level, _, values = bench.report()
     assert level == DiagnosticStatus.STALE
@@ -319,13 +319,13 @@ def test_a_motion_that_nobody_measures_makes_a_stale_report(graph):
 def test_joint_states_without_a_stamp_count_from_their_receipt(graph):
     bench = Bench(graph, PARAMETERS | {'window': 1.0})
     clock = bench.node.get_clock()
-    start = conversions.seconds(clock.now().to_msg()) + 0.1
+    start = stamps.now(clock) + 0.1
     bench.plan(plan_msg(start))
     publisher = graph.probe.create_publisher(JointState, STATES, 10)
 
     def publish():
-        msg = state_msg(conversions.seconds(clock.now().to_msg()), start)
-        msg.header.stamp = conversions.time_msg(0.0)
+        msg = state_msg(stamps.now(clock), start)
+        msg.header.stamp = stamps.time_msg(0.0)
         publisher.publish(msg)
 
     graph.probe.create_timer(0.01, publish)
@@ -333,7 +333,7 @@ def test_joint_states_without_a_stamp_count_from_their_receipt(graph):
     # What counts is received late, by a millisecond or, on a busy machine, more.
     assert float(values['amplitude']) == pytest.approx(AMPLITUDE, rel=0.1)
     assert float(values['frequency']) == pytest.approx(FREQUENCY, rel=0.05)
-    assert conversions.seconds(bench.residuals[0].header.stamp) == pytest.approx(start, abs=1.0)
+    assert stamps.seconds(bench.residuals[0].header.stamp) == pytest.approx(start, abs=1.0)
 
 
 def test_reset_forgets_the_motion_until_the_next_plan(graph, bench):
@@ -369,9 +369,9 @@ def _malformed():
         plan_msg(START + 1.0) for _ in range(7)
     )
     empty.points = []
-    unstamped.header.stamp = conversions.time_msg(0.0)
+    unstamped.header.stamp = stamps.time_msg(0.0)
     short.points[7].positions = [0.0]
-    backwards.points[7].time_from_start = conversions.duration_msg(0.01)
+    backwards.points[7].time_from_start = stamps.duration_msg(0.01)
     undefined.points[7].positions = [nan, 0.0]
     twice.joint_names = ['joint1', 'joint1']
     infinite.points[7].velocities = [0.0, inf]
@@ -446,9 +446,9 @@ def test_diagnostics_tell_phase_and_last_report_once_a_second(graph, bench):
     level, message, values = next_status()
     assert (level, values['phase']) == (DiagnosticStatus.OK, 'idle')
     assert 'no motion has been judged yet' in message
-    first = conversions.seconds(health[0].header.stamp)
+    first = stamps.seconds(health[0].header.stamp)
     assert next_status()[2] == {'phase': 'idle', 'dropped_samples': '0'}
-    assert conversions.seconds(health[0].header.stamp) - first == pytest.approx(1.0, abs=0.5)
+    assert stamps.seconds(health[0].header.stamp) - first == pytest.approx(1.0, abs=0.5)
     bench.plan(plan_msg())
     bench.feed(START + DURATION + WINDOW)
     level, message, values = next_status()
@@ -488,7 +488,7 @@ def test_a_simulated_clock_that_is_first_heard_in_a_motion_is_no_silence(graph):
     graph.expect(lambda: health, 'diagnostics')
 
     def is_heard():
-        graph.publish('/clock', Clock(clock=conversions.time_msg(now)))
+        graph.publish('/clock', Clock(clock=stamps.time_msg(now)))
         return bench.node.get_clock().now().nanoseconds
 
     graph.expect(is_heard, 'the clock')
@@ -630,8 +630,8 @@ def test_a_plan_crosses_the_border():
     position, velocity = motion.reference(START + DURATION / 2)
     assert position.tolist() == pytest.approx([GOAL / 2, 0.0])
     assert velocity.tolist() == pytest.approx([1.5 * GOAL / DURATION, 0.0])
-    assert conversions.is_stamped(state_msg(1e-9))
-    assert not conversions.is_stamped(state_msg(0.0))
+    assert stamps.is_stamped(state_msg(1e-9))
+    assert not stamps.is_stamped(state_msg(0.0))
 
 
 def test_every_level_has_its_diagnostic_and_unknown_values_are_left_out():

@@ -19,7 +19,7 @@ import signal
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from ros.world import table
@@ -49,14 +49,14 @@ class Planner:
 
     def now(self) -> float:
         """Return the time of the node [s]."""
-        return conversions.seconds(self.node.get_clock().now().to_msg())
+        return stamps.now(self.node.get_clock())
 
     def measure(self, position=(0.0, 0.0), velocity=(0.0, 0.0), names=('joint1', 'joint2')):
         """Publish a joint state and wait until the node has it."""
         state = JointState(name=list(names), position=list(position), velocity=list(velocity))
-        state.header.stamp = conversions.time_msg(self.now())
+        state.header.stamp = stamps.time_msg(self.now())
         self.graph.publish('joint_states', state)
-        stamp = conversions.seconds(state.header.stamp)
+        stamp = stamps.seconds(state.header.stamp)
 
         def has_arrived() -> bool:
             sample = self.node._session.measured
@@ -86,9 +86,9 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
 def goal(angle=pi, duration=1.0, stamp=0.0, **fields) -> JointTrajectory:
     """Return a goal for joint 1."""
     arguments = {'positions': [float(angle)], **fields}
-    point = JointTrajectoryPoint(time_from_start=conversions.duration_msg(duration), **arguments)
+    point = JointTrajectoryPoint(time_from_start=stamps.duration_msg(duration), **arguments)
     message = JointTrajectory(joint_names=['joint1'], points=[point])
-    message.header.stamp = conversions.time_msg(stamp)
+    message.header.stamp = stamps.time_msg(stamp)
     return message
 
 
@@ -116,7 +116,7 @@ def test_an_accepted_goal_becomes_a_command_that_an_executor_can_play(planner):
     assert times[-1] == 10**9
     assert np.diff(times).min() > 0
     assert np.diff(times).max() <= 5_000_001
-    start = conversions.seconds(command.header.stamp)
+    start = stamps.seconds(command.header.stamp)
     assert sent_at + 0.05 <= start <= planner.now() + 0.05
     for field in ('positions', 'velocities', 'accelerations', 'effort'):
         rows = table(command, field)
@@ -149,7 +149,7 @@ def test_the_verdict_states_numbers_and_repeats_the_goal(planner):
     assert float(accepted['optimality_residual']) < 1e-9
     assert float(accepted['cost']) > 0.0
     planner.graph.expect(lambda: planner.plans, 'the plan')
-    stamp = conversions.seconds(planner.plans[0].header.stamp)
+    stamp = stamps.seconds(planner.plans[0].header.stamp)
     assert float(accepted['start_time']) == pytest.approx(stamp, abs=1e-6)
     assert accepted['goal.joint_names'] == '[joint1]'
     assert accepted['goal.positions'] == '[3.14159265]'
@@ -188,14 +188,14 @@ def test_the_reference_follows_the_plan_and_the_end_is_announced(planner, graph)
     end = float(finished['start_time']) + 0.3
     assert planner.now() >= end
     graph.expect(
-        lambda: conversions.seconds(planner.references[-1].header.stamp) > end, 'the rest after'
+        lambda: stamps.seconds(planner.references[-1].header.stamp) > end, 'the rest after'
     )
     plan = planner.plans[0]
-    start = conversions.seconds(plan.header.stamp)
-    times = np.array([conversions.seconds(p.time_from_start) for p in plan.points])
+    start = stamps.seconds(plan.header.stamp)
+    times = np.array([stamps.seconds(p.time_from_start) for p in plan.points])
     moving = 0
     for reference in planner.references:
-        elapsed = conversions.seconds(reference.header.stamp) - start
+        elapsed = stamps.seconds(reference.header.stamp) - start
         moving += 0.0 < elapsed < 0.3
         expected = np.interp(elapsed, times, table(plan, 'positions')[:, 0])
         assert reference.position[0] == pytest.approx(expected, abs=0.01)
@@ -426,7 +426,7 @@ def test_namespaces_and_remappings_hold(graph):
     planner = Planner(graph, {}, '-r', '__ns:=/left', '-r', 'joint_states:=/left/measured')
     assert planner.name == '/left/flat_planner'
     state = JointState(name=['joint1', 'joint2'], position=[0.2, 0.0])
-    state.header.stamp = conversions.time_msg(planner.now())
+    state.header.stamp = stamps.time_msg(planner.now())
     graph.publish('/left/measured', state)
     graph.expect(lambda: planner.node._session.measured is not None, 'the measured state')
     assert planner.send(goal())['state'] == 'ACCEPTED'

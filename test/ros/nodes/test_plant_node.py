@@ -23,7 +23,7 @@ from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm
 from flat_planner_ros.core.plant import PacedArm, rollout
 from flat_planner_ros.ros.nodes.plant_node import CLOCK_START, PlantNode
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
-from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire import conversions, stamps
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
@@ -90,7 +90,7 @@ class Plant(Observer):
         """Let a plant that follows /clock go on to a time, in paces that it need not skip."""
         while newest(self.states) < until - 0.01:
             time = min(newest(self.states) + 0.2, until) if self.states else until
-            self.graph.publish('/clock', Clock(clock=conversions.time_msg(time)))
+            self.graph.publish('/clock', Clock(clock=stamps.time_msg(time)))
             self.graph.expect(lambda t=time: newest(self.states) > t - 0.01, f'{time:.3f} s')
 
     def play(self, start: float, **fields):
@@ -116,11 +116,11 @@ def trajectory(start, duration=1.0, **fields):
     """Return a command of one sine wave as the planner would send it, with other fields."""
     times, efforts = wave(duration)
     points = [
-        JointTrajectoryPoint(time_from_start=conversions.duration_msg(t), effort=[e, 0.0])
+        JointTrajectoryPoint(time_from_start=stamps.duration_msg(t), effort=[e, 0.0])
         for t, e in zip(times.tolist(), efforts.tolist(), strict=True)
     ]
     message = JointTrajectory(joint_names=['joint1', 'joint2'], points=points)
-    message.header.stamp = conversions.time_msg(start)
+    message.header.stamp = stamps.time_msg(start)
     for name, value in fields.items():
         setattr(message, name, value)
     return message
@@ -159,7 +159,7 @@ def test_joint_states_come_evenly_at_200_hz(graph):
     assert first.name == ['joint1', 'joint2']
     assert all(len(getattr(first, f)) == 2 for f in ('position', 'velocity', 'effort'))
     assert np.diff(plant.times) == pytest.approx(5e-3, abs=1e-6)
-    present = conversions.seconds(plant.node.get_clock().now().to_msg())
+    present = stamps.now(plant.node.get_clock())
     assert present - 2.0 < plant.now() < present
     assert np.array_equal(plant.table('position'), np.zeros((len(plant.states), 2)))
     assert quiet(graph)
@@ -259,7 +259,7 @@ def test_reset_brings_it_to_rest_where_it_started(graph):
 
 def point(time=0.5, effort=(0.0, 0.0), **fields):
     """Return one point of a command."""
-    duration = conversions.duration_msg(time)
+    duration = stamps.duration_msg(time)
     return JointTrajectoryPoint(time_from_start=duration, effort=list(effort), **fields)
 
 
@@ -345,7 +345,7 @@ def test_it_publishes_the_time_from_its_very_start(graph):
     plant = Plant(graph, QUICK)
     graph.expect(lambda: len(ticks) > 20, 'the clock')
     graph.expect(lambda: len(plant.states) > 20, 'joint states')
-    assert conversions.seconds(ticks[0].clock) == CLOCK_START
+    assert stamps.seconds(ticks[0].clock) == CLOCK_START
     shown = [state.header.stamp for state in plant.states[:20]]
     assert [tick.clock for tick in ticks[:20]] == shown
 
@@ -379,9 +379,9 @@ def test_it_follows_a_clock_of_others(graph):
 def test_a_skipped_time_is_told_with_its_length(graph):
     plant = Plant(graph, {'use_sim_time': True})
     plant.drive(100.0)
-    graph.publish('/clock', Clock(clock=conversions.time_msg(200.0)))
+    graph.publish('/clock', Clock(clock=stamps.time_msg(200.0)))
     (warning,) = plant.logged('skipped to keep up')
-    graph.publish('/clock', Clock(clock=conversions.time_msg(200.1)))
+    graph.publish('/clock', Clock(clock=stamps.time_msg(200.1)))
     plant.wait_until(200.09)
     assert len(plant.states) < 30
     assert float(warning.split()[0]) == pytest.approx(100.0, abs=0.01)
@@ -427,7 +427,7 @@ def test_feedback_holds_what_friction_would_stop(graph):
         plant = Plant(graph, parameters)
         message = trajectory(plant.ahead())
         for sent in message.points:
-            sent.positions = [0.2 * conversions.seconds(sent.time_from_start), 0.0]
+            sent.positions = [0.2 * stamps.seconds(sent.time_from_start), 0.0]
             sent.effort = [0.0, 0.0]
         graph.publish(COMMAND, message)
         plant.wait_until(plant.ahead() + 3.0)
@@ -456,7 +456,7 @@ def test_arms_of_more_joints_have_friction_mismatch_and_feedback(graph, n):
     assert settings.arm.viscous_friction == pytest.approx(friction)
     begin, start = np.array(settings.position), plant.ahead()
     message = JointTrajectory(joint_names=plant.states[0].name)
-    message.header.stamp = conversions.time_msg(start)
+    message.header.stamp = stamps.time_msg(start)
     turn = 0.3 * np.eye(n)[0]
     for s in np.linspace(0.0, 1.0, 51):
         position = begin + turn * s**2 * (3 - 2 * s)

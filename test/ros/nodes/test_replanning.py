@@ -16,7 +16,7 @@
 
 from math import pi
 
-from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
 from ros.world import stamp, Suite, values
@@ -137,4 +137,4 @@ def test_a_stream_of_efforts_moves_the_arm_as_well_as_its_jitter_allows(graph):
 def points(command: JointTrajectory):
     """Yield absolute times [s] and points."""
     for point in command.points:
-        yield stamp(command) + conversions.seconds(point.time_from_start), point
+        yield stamp(command) + stamps.seconds(point.time_from_start), point

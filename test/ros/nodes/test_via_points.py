@@ -14,7 +14,7 @@
 
 """Via points through the nodes: plan and plant pass them, and nothing is left swinging."""
 
-from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
 from ros.world import ask, goal, stamp, Suite, values
@@ -36,7 +36,7 @@ def through(times):
 
 def last_link(plan: JointTrajectory) -> tuple[np.ndarray, np.ndarray]:
     """Return the times of a plan [s] and the angle of the last link, the sum of all joints'."""
-    times = [conversions.seconds(point.time_from_start) for point in plan.points]
+    times = [stamps.seconds(point.time_from_start) for point in plan.points]
     return np.array(times), np.array([sum(point.positions) for point in plan.points])
 
 

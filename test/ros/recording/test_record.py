@@ -26,7 +26,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 from flat_planner_ros.ros.wire.message_types import definition, message_class, UnknownType
 import numpy as np
 import pytest
@@ -77,12 +77,12 @@ def plan() -> JointTrajectory:
     points = [
         JointTrajectoryPoint(
             positions=[10 * s**3 - 15 * s**4 + 6 * s**5, 0.0],
-            time_from_start=conversions.duration_msg(s * MOTION),
+            time_from_start=stamps.duration_msg(s * MOTION),
         )
         for s in np.linspace(0.0, 1.0, 51).tolist()
     ]
     msg = JointTrajectory(joint_names=['joint1', 'joint2'], points=points)
-    msg.header.stamp = conversions.time_msg(START)
+    msg.header.stamp = stamps.time_msg(START)
     return msg
 
 
@@ -93,7 +93,7 @@ def swinging(time: float) -> JointState:
     # A free joint 1 moves against the last link, in proportion to the inertias.
     position = [1.0 - 3.3e-5 / 6.4e-4 * swing, swing]
     msg = JointState(name=['joint1', 'joint2'], position=array('d', position))
-    msg.header.stamp = conversions.time_msg(START + time)
+    msg.header.stamp = stamps.time_msg(START + time)
     return msg
 
 

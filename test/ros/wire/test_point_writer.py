@@ -14,8 +14,8 @@
 
 """Serialised trajectories against those that the middleware makes of messages."""
 
-from flat_planner_ros.ros.wire.conversions import duration_msg, time_msg
 from flat_planner_ros.ros.wire.point_writer import trajectory_bytes
+from flat_planner_ros.ros.wire.stamps import duration_msg, time_msg
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message

@@ -33,7 +33,7 @@ from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
 from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.parameters.plant import ROWS as PLANT_ROWS
-from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire import interfaces, stamps
 from hypothesis import given, HealthCheck, Phase, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -83,7 +83,7 @@ def some(count: int):
 
 
 @st.composite
-def stamps(draw):
+def goal_stamps(draw):
     """Return a stamp, mostly the one for as soon as possible."""
     kind = draw(st.integers(0, 3))
     if kind == 0:
@@ -107,7 +107,7 @@ def trajectories(draw, effort: bool):
             )
         )
     message = JointTrajectory(joint_names=chosen, points=points)
-    message.header.stamp = draw(stamps())
+    message.header.stamp = draw(goal_stamps())
     return message
 
 
@@ -131,7 +131,7 @@ def joint_states(draw):
         velocity=draw(some(len(chosen))),
         effort=draw(some(len(chosen))),
     )
-    message.header.stamp = draw(stamps())
+    message.header.stamp = draw(goal_stamps())
     return message
 
 
@@ -168,7 +168,7 @@ def memory() -> float:
 
 def now_of(node) -> float:
     """Return the time of a node [s]."""
-    return conversions.seconds(node.get_clock().now().to_msg())
+    return stamps.now(node.get_clock())
 
 
 class Goals:
@@ -187,7 +187,7 @@ class Goals:
             JointTrajectory, '/flat_planner/joint_trajectory', interfaces.RELIABLE
         )
         state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
-        state.header.stamp = conversions.time_msg(now_of(self.planner))
+        state.header.stamp = stamps.time_msg(now_of(self.planner))
         graph.publish('/joint_states', state)
         graph.expect(lambda: self.planner._session.measured is not None, 'the measured state')
         self.publisher = graph.probe.create_publisher(JointTrajectory, '/flat_planner/goal', 10)
@@ -335,7 +335,7 @@ def test_random_parameters_are_refused_or_consistent(graph, node_class, rows):
 def _still_serves(graph, goals: Goals, monitor) -> None:
     """Check that planner and monitor answer as before."""
     state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
-    state.header.stamp = conversions.time_msg(now_of(goals.planner))
+    state.header.stamp = stamps.time_msg(now_of(goals.planner))
     graph.publish('/joint_states', state, readers=2)
     assert goals.send(goal(1.0, 1.0))['state'] == 'ACCEPTED'
     graph.expect(lambda: monitor.get_name() == 'flat_monitor', 'the monitor')
