@@ -49,7 +49,9 @@ MESSAGES_ALLOWED = {
     'diagnostics.py': 'the same for verdicts and reports',
     '*_node.py': 'the types of its topics and services',
     'model_adoption.py': 'hears reports and answers a service for the planner node',
-    'declaration.py': 'descriptors and verdicts of parameters, from rcl_interfaces',
+    'row.py': 'descriptors of parameters, from rcl_interfaces',
+    'node_parameters.py': 'verdicts on changed parameters, from rcl_interfaces',
+    'stamps.py': 'stamps to seconds and back',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
 }
 """Patterns of the files that import message packages, each with its reason."""
