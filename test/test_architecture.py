@@ -36,7 +36,7 @@ NODES = sorted(ROS.glob('nodes/*_node.py'))
 WINGS = {
     'arm': '',
     'motion_law': 'arm',
-    'insensitive': 'arm',
+    'insensitive': 'motion_law arm',
     'planning': 'motion_law insensitive arm',
     'session': 'planning arm',
     'plant': 'arm',

@@ -21,14 +21,14 @@ therefore a sigma, expanded here in Legendre polynomials, and the planned variab
 like an oscillator: w + delta w' + w'' / omega^2 = sigma.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, sqrt
 
 from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, PlanarArm
+from flat_planner_ros.core.motion_law import JET_ORDER, ScaledLaw
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike
 
 CONTACT = 3
 """
@@ -40,9 +40,6 @@ oscillation left, these are the twelve conditions of the other strategies.
 
 TOP = CONTACT + 1
 """Derivative of sigma in which laws are expanded."""
-
-JET_ORDER = 6
-"""Highest derivative of w that joint motions and the flat plan need."""
 
 SPLIT_TURN = 1.5
 """
@@ -169,54 +166,26 @@ def integration(size: int) -> FloatArray:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SeriesLaw:
+class SeriesLaw(ScaledLaw):
     """
     A planned variable as Legendre series of its derivatives, plus one decaying oscillation.
 
     Attributes
     ----------
-    duration
-        Length of the motion [s].
     table
         Row k holds the coefficients of the k-th derivative in x, shape (7, m).
     rate, amplitude
         Of the oscillation Re(amplitude exp(rate (x + 1))).
-    factor, offset
-        Multiply and shift the value.
 
     """
 
-    duration: float
     table: FloatArray
     rate: complex = 0j
     amplitude: complex = 0j
-    factor: float = 1.0
-    offset: float = 0.0
 
-    def over(self, distance: float, middle: float) -> 'SeriesLaw':
-        """Return the law over another distance about another place [rad]."""
-        return replace(self, factor=distance, offset=middle)
-
-    def jet(self, t: ArrayLike, order: int, /) -> FloatArray:
-        """
-        Return the value and its derivatives up to an order.
-
-        Parameters
-        ----------
-        t
-            Times from the start of the motion, shape (m,) [s].
-        order
-            Highest derivative wanted.
-
-        Returns
-        -------
-        FloatArray
-            Row k holds the k-th derivative, shape (order + 1, m) [rad/s^k].
-
-        """
-        times = np.atleast_1d(np.asarray(t, dtype=float))
-        rate = 2.0 / self.duration
-        x = np.clip(rate * times - 1.0, -1.0, 1.0)
+    def normalised_jet(self, distances: FloatArray, order: int) -> FloatArray:
+        """Return the series and its derivatives, as `ScaledLaw.normalised_jet`."""
+        x = np.clip(distances[0] - 1.0, -1.0, 1.0)
         table = self.table[: order + 1]
         if order > JET_ORDER:
             higher = np.zeros((order - JET_ORDER, table.shape[1]))
@@ -228,8 +197,6 @@ class SeriesLaw:
         if self.amplitude:
             powers = self.amplitude * self.rate ** np.arange(order + 1)
             result += np.multiply.outer(powers, np.exp(self.rate * (x + 1.0))).real
-        result *= (self.factor * rate ** np.arange(order + 1.0))[:, None]
-        result[0] += self.offset
         return result
 
 

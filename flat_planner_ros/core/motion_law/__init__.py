@@ -25,36 +25,37 @@ from flat_planner_ros.core.motion_law.extremal import (
     BoundaryConditions,
     costate,
     extremals,
-    stationarity_residual,
-)
-from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
-from flat_planner_ros.core.motion_law.quadrature import motion_quadrature
-from flat_planner_ros.core.motion_law.unit_motion import (
-    GRIDS_KEPT,
-    JET_ORDER,
-    MAX_KEPT_INTERVALS,
     probes,
+    stationarity_residual,
     unit_motion,
     UnitMotion,
 )
+from flat_planner_ros.core.motion_law.law import (
+    ExponentialLaw,
+    JET_ORDER,
+    Law,
+    MAX_DERIVATIVE,
+    motion_quadrature,
+    ScaledLaw,
+)
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 
 __all__ = [
-    'CONDITIONS',
-    'extremals',
-    'GRIDS_KEPT',
-    'JET_ORDER',
     'BoundaryConditions',
-    'MAX_DERIVATIVE',
-    'MAX_KEPT_INTERVALS',
-    'MAX_WEIGHT',
+    'CONDITIONS',
     'costate',
-    'motion_quadrature',
     'ExponentialLaw',
+    'extremals',
+    'JET_ORDER',
+    'Law',
+    'MAX_DERIVATIVE',
+    'MAX_WEIGHT',
+    'motion_quadrature',
     'optimal_path',
     'PathConditions',
     'probes',
     'QuadraticCost',
+    'ScaledLaw',
     'stationarity_residual',
     'Strategy',
     'strategy_cost',

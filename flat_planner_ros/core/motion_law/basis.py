@@ -13,20 +13,24 @@
 # limitations under the License.
 
 """
-Solutions of the Euler-Lagrange equation, cluster by cluster, and their derivatives at the end.
+Basis of the Euler-Lagrange equation's solutions, cluster by cluster, and its derivatives at ends.
 
 Roots that crowd together would make separate exponentials nearly dependent; such a cluster is
 spanned by the solutions of its own small equation with unit initial values: an exponential times a
-power series ((28) of docs/derivation.md).
+power series ((28) of docs/derivation.md). From rest to rest, one parity suffices and derivatives 0
+to 5 at one end. A segment between via points needs all twelve solutions, with derivatives up to
+the eleventh at both ends, since neighbours share the conditions there ((V4)).
 """
 
 from cmath import exp
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.motion_law.modes import leibniz, Number, series_derivatives
-from flat_planner_ros.core.motion_law.roots import Cluster
+from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
+from flat_planner_ros.core.motion_law.terms import leibniz, Number, series_derivatives, Term
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +38,9 @@ ComplexArray = NDArray[np.complex128]
 
 CONDITIONS = 6
 """Conditions at either end: the value and five derivatives."""
+
+SOLUTIONS = 2 * CONDITIONS
+"""Solutions of the equation, and derivatives of each that knots join: orders 0 to 11."""
 
 SERIES_LENGTH = 64
 """Terms of a cluster's power series; clusters as wide as the links allow need about fifty."""
@@ -47,6 +54,23 @@ ALTERNATING = (-1.0) ** np.arange(CONDITIONS)
 CENTRES_KEPT = 32
 """Solutions around zero that are remembered, mostly 1, x, x^2, x^3."""
 
+BASES_KEPT = 256
+"""Bases that are remembered: those of several paths of fifty via points."""
+
+SPECTRA_KEPT = 64
+"""Sets of roots that are remembered, one for each combination of arm and cost."""
+
+_END = np.array([1.0])
+
+_FAR_END = np.array([-2.0])
+
+_ENDS = np.array([-1.0, 1.0])
+
+_MIRRORED = np.tile(ALTERNATING, 2)
+
+_ALONE = np.array([[1.0 + 0.0j], [-1j]])
+"""Series of one exponential: its real and its imaginary part."""
+
 
 class Block(NamedTuple):
     """
@@ -59,10 +83,10 @@ class Block(NamedTuple):
     columns
         Their derivatives 0 to 5 at x = 1, a list of six numbers each.
     rate, origin
-        Of their modes; those with an origin at the end have a mirror image.
+        As in their terms; those with an origin at the end have a mirror image.
     series
-        Coefficients of the modes, one in each row, shape (functions, terms); None if they are the
-        real and the imaginary part of one exponential.
+        Coefficients of ascending powers, one solution in each row, shape (functions, powers); None
+        if they are the real and the imaginary part of one exponential.
 
     """
 
@@ -72,11 +96,26 @@ class Block(NamedTuple):
     origin: int
     series: FloatArray | ComplexArray | None
 
-    def combined(self, weights: list[float]) -> tuple[complex, ...]:
-        """Return the coefficients of a combination of the solutions."""
-        if self.series is None:
-            return (complex(weights[0], -weights[1] if len(weights) > 1 else 0.0),)
-        return tuple((np.array(weights) @ self.series).tolist())
+    def combined(self, amplitudes: list[float]) -> Term:
+        """Return a combination of the solutions, without mirror images."""
+        if self.series is not None:
+            coefficients = tuple((np.array(amplitudes) @ self.series).tolist())
+        elif len(amplitudes) == 1:
+            coefficients = (complex(amplitudes[0], 0.0),)
+        else:
+            coefficients = (complex(amplitudes[0], -amplitudes[1]),)
+        return Term(self.rate, self.origin, coefficients)
+
+
+def combined(blocks: Iterable[Block], amplitudes: list[float]) -> list[Term]:
+    """Return the term of each block in a combination of all their solutions."""
+    terms = []
+    first = 0
+    for block in blocks:
+        last = first + len(block.columns)
+        terms.append(block.combined(amplitudes[first:last]))
+        first = last
+    return terms
 
 
 def block_of(cluster: Cluster, parity: float) -> Block:
@@ -89,17 +128,20 @@ def block_of(cluster: Cluster, parity: float) -> Block:
     table = unit_solutions(cluster.factor, SERIES_LENGTH)
     if centre.real == 0.0:
         # conj(f_j(-x)) = (-1)^j f_j(x): Re f_j has the parity of j, Im f_j the other one.
-        even = np.arange(len(table)) % 2 == 0
-        table = np.where(even == (parity > 0.0), 1.0, -1j)[:, None] * table
-        series, origin = table / _factorials(SERIES_LENGTH), 0
-        ends = _derivatives(centre, series, 1.0)
+        is_odd = np.arange(len(table)) % 2
+        table = np.where(is_odd == _lowest_power(parity), 1.0, -1j)[:, None] * table
+        series = table / _factorials(SERIES_LENGTH)
+        origin = 0
+        [ends] = _derivatives(centre, series, _END, CONDITIONS - 1)
     else:
         if centre.imag != 0.0:
             table = np.concatenate([table, -1j * table])
-        series, origin = table / _factorials(SERIES_LENGTH), 1
+        series = table / _factorials(SERIES_LENGTH)
+        origin = 1
         ends = table[:, :CONDITIONS] @ leibniz(centre, CONDITIONS - 1).T
         if centre.real < FAR:
-            ends = ends + parity * ALTERNATING * _derivatives(centre, series, -2.0)
+            [image] = _derivatives(centre, series, _FAR_END, CONDITIONS - 1)
+            ends = ends + parity * ALTERNATING * image
     growth = max(1.0, abs(centre), _spread(cluster.factor))
     return Block(growth, ends.real.tolist(), centre, origin, series)
 
@@ -111,7 +153,7 @@ def _central(factor: bytes, parity: float) -> Block:
     even = np.frombuffer(factor)
     terms = np.zeros((len(even) // 2, SERIES_LENGTH))
     half = unit_solutions(even[::2], SERIES_LENGTH // 2)
-    terms[:, (0 if parity > 0.0 else 1) :: 2] = half
+    terms[:, _lowest_power(parity) :: 2] = half
     last = np.flatnonzero(terms.any(axis=0))[-1]
     series = terms[:, : last + 1] / _factorials(SERIES_LENGTH)[: last + 1]
     columns = series_derivatives(series, CONDITIONS - 1).sum(axis=1).tolist()
@@ -121,7 +163,9 @@ def _central(factor: bytes, parity: float) -> Block:
 def _exponentials(beta: complex, parity: float) -> Block:
     """Return exp(beta (x - 1)) with its mirror image, real and imaginary part."""
     image = parity * exp(-2.0 * beta) if beta.real < FAR else 0.0
-    sums, values, power = (1.0 + image, 1.0 - image), [], 1.0 + 0.0j
+    sums = (1.0 + image, 1.0 - image)
+    values = []
+    power = 1.0 + 0.0j
     for order in range(CONDITIONS):
         values.append(power * sums[order % 2])
         power *= beta
@@ -132,12 +176,19 @@ def _exponentials(beta: complex, parity: float) -> Block:
     return Block(abs(beta), columns, beta, 1, None)
 
 
-def _derivatives(rate: complex, series: ComplexArray, u: float) -> ComplexArray:
-    """Return the derivatives 0 to 5 of exp(rate u) times power series at u, shape (rows, 6)."""
-    table = series_derivatives(series, CONDITIONS - 1)  # (rows, terms, 6)
-    powers = u ** np.arange(series.shape[1], dtype=float)
-    result: ComplexArray = exp(rate * u) * (powers @ table) @ leibniz(rate, CONDITIONS - 1).T
-    return result
+def _lowest_power(parity: float) -> int:
+    """Return the lowest power of x that has a parity."""
+    return 0 if parity > 0.0 else 1
+
+
+def _derivatives(
+    rate: complex, series: NDArray[Number], places: FloatArray, order: int
+) -> list[ComplexArray]:
+    """Return the derivatives of exp(rate u) times power series at each u, (functions, orders)."""
+    powers = places[:, None] ** np.arange(series.shape[1], dtype=float)
+    plain = powers @ series_derivatives(series, order)  # (functions, places, orders)
+    factors = leibniz(rate, order).T
+    return [exp(rate * u) * plain[:, i] @ factors for i, u in enumerate(places.tolist())]
 
 
 def _spread(factor: NDArray[Number]) -> float:
@@ -184,3 +235,100 @@ def unit_solutions(factor: NDArray[Number], terms: int) -> NDArray[Number]:
 def _factorials(count: int) -> FloatArray:
     """Return 0! ... (count - 1)!."""
     return np.cumprod(np.maximum(np.arange(count, dtype=float), 1.0))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SegmentBasis:
+    """
+    Solutions on a segment, in normalised time x from -1 to 1.
+
+    Attributes
+    ----------
+    groups
+        Blocks of solutions, each with whether its mirror image is meant; columns below follow
+        this order.
+    at_start, at_end
+        Derivatives 0 to 11 of every solution at x = -1 and x = 1, shape (12, 12) [-].
+    rates
+        How fast solutions of one parity grow with the order of the derivative, ascending, at
+        least 1, shape (6,) [-].
+
+    """
+
+    groups: tuple[tuple[Block, bool], ...]
+    at_start: FloatArray
+    at_end: FloatArray
+    rates: FloatArray
+
+    def combined(self, amplitudes: FloatArray) -> tuple[Term, ...]:
+        """Return the terms of a combination of the solutions, amplitudes of shape (12,)."""
+        terms = combined((block for block, _ in self.groups), amplitudes.tolist())
+        return tuple(
+            term.mirrored(1.0) if is_image else term
+            for term, (_, is_image) in zip(terms, self.groups, strict=True)
+        )
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def segment_basis(key: bytes, reference: bytes) -> SegmentBasis:
+    """
+    Return the solutions of an equation.
+
+    Parameters
+    ----------
+    key
+        The bytes of the coefficients a_0 ... a_6 in normalised time.
+    reference
+        The same in another unit of time, common to all segments of a path: in it the roots are
+        found.
+
+    """
+    scale = _scale(np.frombuffer(key), np.frombuffer(reference))
+    found = sorted(_spectrum(reference).clusters(scale), key=lambda cluster: abs(cluster.centre))
+    groups: list[tuple[Block, bool]] = []
+    rates: list[float] = []
+    starts: list[FloatArray] = []
+    ends: list[FloatArray] = []
+    for cluster in found:
+        even = block_of(cluster, 1.0)
+        rates += [even.growth] * len(even.columns)
+        if even.origin == 0:
+            for block in (even, block_of(cluster, -1.0)):
+                groups.append((block, False))
+                at_start, at_end = _ends(block, _ENDS)
+                starts.append(at_start)
+                ends.append(at_end)
+            continue
+        far, near = _ends(even, _ENDS - 1.0)
+        # Each solution by itself, not odd and even ones: a boundary layer stays at its own end.
+        groups += [(even, False), (even, True)]
+        starts += [far, _MIRRORED * near]
+        ends += [near, _MIRRORED * far]
+    return SegmentBasis(
+        groups=tuple(groups),
+        at_start=np.concatenate(starts).T,
+        at_end=np.concatenate(ends).T,
+        rates=np.array(sorted(rates)),
+    )
+
+
+@lru_cache(maxsize=SPECTRA_KEPT)
+def _spectrum(reference: bytes) -> Spectrum:
+    """Return the roots of an equation in its reference unit of time."""
+    return Spectrum(np.frombuffer(reference))
+
+
+def _scale(coefficients: FloatArray, reference: FloatArray) -> float:
+    """Return the roots of an equation in units of those of the reference."""
+    # The lowest coefficient carries the highest power of the unit, and least of its rounding.
+    lowest = int(np.flatnonzero(reference)[0])
+    if lowest == CONDITIONS:
+        return 1.0
+    ratio = float(coefficients[lowest] / reference[lowest])
+    return float(ratio ** (0.5 / (CONDITIONS - lowest)))
+
+
+def _ends(block: Block, places: FloatArray) -> list[FloatArray]:
+    """Return derivatives 0 to 11 of a block's solutions at distances from their origin."""
+    series = _ALONE[: len(block.columns)] if block.series is None else block.series
+    return [ends.real for ends in _derivatives(block.rate, series, places, SOLUTIONS - 1)]

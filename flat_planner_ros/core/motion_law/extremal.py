@@ -17,30 +17,55 @@ Extremals of a quadratic cost: the Euler-Lagrange equation solved for given ends
 
 The equation has constant coefficients and only even derivatives, sum_k a_k y^(2k) = 0, so its
 solutions split into odd and even ones about the middle of the motion and its roots come as +-beta
-(docs/derivation.md, section 5). Roots that crowd together would make separate exponentials nearly
-dependent; such a cluster is spanned by the solutions of its own small equation with unit initial
-values: an exponential times a power series. One root alone gives the paper's exponential, a
-multiple root an exponential times a polynomial, and twelve roots near zero the polynomial law: one
-mechanism without a special case.
+(docs/derivation.md, section 5). One root alone gives the paper's exponential, a multiple root an
+exponential times a polynomial, and twelve roots near zero the polynomial law: one mechanism
+without a special case.
+
+From rest to rest, everything about a law but its size, place and duration follows from the six
+normalised coefficients of its equation ((23)). Unit motions, from -1/2 to 1/2 in normalised time,
+are therefore certified once and kept: other distances, and other arms with the same numbers, are
+multiples.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law.basis import ALTERNATING, Block, block_of, CONDITIONS
-from flat_planner_ros.core.motion_law.law import ExponentialLaw
-from flat_planner_ros.core.motion_law.modes import Mode
+from flat_planner_ros.core.motion_law.basis import ALTERNATING, block_of, combined, CONDITIONS
+from flat_planner_ros.core.motion_law.law import ExponentialLaw, half_quadrature, JET_ORDER
 from flat_planner_ros.core.motion_law.roots import Cluster, clusters
+from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
-
-_ORDERS = np.arange(CONDITIONS + 1.0)
-
-_UNIT_END = 0.5 * np.eye(CONDITIONS)[0]
 
 RESIDUAL_STEPS = 1
 """Corrections of the solved boundary conditions by their own residual."""
+
+PROBES = 8
+"""Evenly spaced times of half a motion at which a law is certified, besides those near the end."""
+
+PROBE_DEPTH = 36
+"""Halvings of the distance to the start at which a law is certified."""
+
+KEY_BITS = 48
+"""
+Leading bits of the normalised coefficients under which a unit motion is kept.
+
+Coefficients are computed with errors of a few units in their last, 53rd bit. What is left of them
+differs for equal numbers of two arms only where such an error crosses a multiple of 2^-48.
+"""
+
+SAME = 2.0**-49
+"""Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
+
+UNITS_KEPT = 64
+"""Unit motions in the cache; the one unused for longest makes room."""
+
+_ORDERS = np.arange(CONDITIONS + 1.0)
+
+_UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,40 +119,24 @@ def extremals(
     solvers: dict[float, _BoundarySolver] = {}
     laws = []
     for ends in jets:
-        start, end = ends.start * powers[:CONDITIONS], ends.end * powers[:CONDITIONS]
+        start = ends.start * powers[:CONDITIONS]
+        end = ends.end * powers[:CONDITIONS]
         middle = 0.5 * (ends.start[0] + ends.end[0])
-        modes = []
+        terms = []
         if middle:
-            modes.append(Mode(rate=0j, origin=0, coefficients=(complex(middle),)))
+            terms.append(Term(rate=0j, origin=0, coefficients=(complex(middle),)))
         mirrored = ALTERNATING * start
         for parity in (-1.0, 1.0):
             # Right-hand side of the law's odd or even part about the middle, at the end x = 1.
             target = 0.5 * (end + parity * mirrored)
-            target[0] -= middle if parity > 0.0 else 0.0
+            if parity > 0.0:
+                target[0] -= middle
             if target.any():
                 if parity not in solvers:
                     solvers[parity] = _BoundarySolver(found, parity)
-                modes.extend(solvers[parity].modes(target))
-        laws.append(ExponentialLaw(duration=duration, modes=tuple(modes)))
+                terms.extend(solvers[parity].terms(target))
+        laws.append(ExponentialLaw(duration=duration, terms=tuple(terms)))
     return laws
-
-
-def unit_modes(coefficients: FloatArray) -> tuple[Mode, ...]:
-    """
-    Return the stationary law from rest at -1/2 to rest at 1/2 in normalised time; it is odd.
-
-    Parameters
-    ----------
-    coefficients
-        a_0 ... a_6 in normalised time, shape (7,) [-].
-
-    Raises
-    ------
-    UncertifiedPlan
-        The boundary conditions are singular in double precision.
-
-    """
-    return tuple(_BoundarySolver(clusters(coefficients), -1.0).modes(_UNIT_END))
 
 
 def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
@@ -178,7 +187,7 @@ def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
 
 
 class _BoundarySolver:
-    """Fits the solutions of one parity to jets at x = 1; the matrix is inverted once."""
+    """Fits the solutions of one parity to derivatives at x = 1; the matrix is inverted once."""
 
     def __init__(self, found: Sequence[Cluster], parity: float) -> None:
         """Scale the conditions' matrix and invert it."""
@@ -193,26 +202,18 @@ class _BoundarySolver:
         except np.linalg.LinAlgError as error:
             raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
 
-    def modes(self, target: FloatArray) -> list[Mode]:
-        """Return the modes of the combination of solutions that meets a jet."""
+    def terms(self, target: FloatArray) -> list[Term]:
+        """Return the terms of the combination of solutions that meets derivatives 0 to 5."""
         target = self._rows * target
-        weights = self._inverse @ target
+        amplitudes = self._inverse @ target
         for _ in range(RESIDUAL_STEPS):
-            weights += self._inverse @ (target - self._matrix @ weights)
-        return _combined(self._blocks, weights.tolist(), self._parity)
-
-
-def _combined(blocks: Sequence[Block], weights: list[float], parity: float) -> list[Mode]:
-    """Return one mode for each block, with its mirror image unless it is symmetric by itself."""
-    modes, first = [], 0
-    for block in blocks:
-        last = first + len(block.columns)
-        mode = Mode(block.rate, block.origin, block.combined(weights[first:last]))
-        modes.append(mode)
-        if block.origin != 0:
-            modes.append(mode.mirrored(parity))
-        first = last
-    return modes
+            amplitudes += self._inverse @ (target - self._matrix @ amplitudes)
+        terms = []
+        for term in combined(self._blocks, amplitudes.tolist()):
+            terms.append(term)
+            if term.origin != 0:  # else it is symmetric by itself
+                terms.append(term.mirrored(self._parity))
+        return terms
 
 
 def _row_factors(rates: Sequence[float]) -> FloatArray:
@@ -227,3 +228,163 @@ def _row_factors(rates: Sequence[float]) -> FloatArray:
     for slow, fast in pairwise(rates):
         factors.append(factors[-1] / (slow * fast) ** 0.5)
     return np.array(factors)
+
+
+class Mean(NamedTuple):
+    """Means and peaks over a motion, of linear combinations of derivatives."""
+
+    mean_square: FloatArray
+    peak: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnitMotion:
+    """
+    Optimal law of one unit of distance and its quality, all in normalised time [-].
+
+    Attributes
+    ----------
+    coefficients
+        a_0 ... a_6 of its equation, shape (7,).
+    law
+        From -1/2 at t = 0 to 1/2 at t = 2; odd about the middle.
+    boundary_residual
+        (31) of docs/derivation.md.
+    optimality_residual
+        (32) of docs/derivation.md, at most, for all coefficients that count as equal.
+    costate
+        (33) of docs/derivation.md, here also the cost.
+    peaks
+        Largest magnitudes of the derivatives 0 to 6 at the times of the certificate.
+
+    """
+
+    coefficients: FloatArray
+    law: ExponentialLaw
+    boundary_residual: float
+    optimality_residual: float
+    costate: float
+    peaks: FloatArray
+
+    def law_over(self, duration: float, distance: float, middle: float) -> ExponentialLaw:
+        """Return the law in physical time [s] over a distance about a place [rad]."""
+        return replace(self.law, duration=duration, factor=distance, offset=middle)
+
+    def jet(self, after_start: FloatArray, before_end: FloatArray) -> FloatArray:
+        """Return the derivatives 0 to 6 at x + 1 and 1 - x, shape (7, m)."""
+        return self.law.normalised_jet(np.array([after_start, before_end]), JET_ORDER)
+
+    def fill_grid(self, table: FloatArray, rates: FloatArray) -> None:
+        """
+        Write the derivatives 0 to 6 at even times, the residuals at the ends removed.
+
+        Parameters
+        ----------
+        table
+            Takes the derivatives, shape (7, m), m > 1.
+        rates
+            Their factors, shape (7,).
+
+        """
+        self.law.total.fill_odd_grid(table, rates)
+        table[1:CONDITIONS, 0] = 0.0
+        table[1:CONDITIONS, -1] = 0.0
+        table[0, 0] = -0.5 * rates[0]
+        table[0, -1] = 0.5 * rates[0]
+
+    def mean(self, rows: FloatArray) -> Mean:
+        """
+        Return mean squares and peaks of combinations of derivatives over the motion.
+
+        Parameters
+        ----------
+        rows
+            Factors of the derivatives 0 to 6, none of the value itself, shape (m, 7).
+
+        """
+        weights, jet = self._fine
+        # Derivatives of even order are odd about the middle: the other half has their sign turned.
+        odd = rows[:, 2::2] @ jet[2::2]
+        even = rows[:, 1::2] @ jet[1::2]
+        return Mean((odd**2 + even**2) @ weights, (np.abs(odd) + np.abs(even)).max(axis=1))
+
+    @cached_property
+    def _fine(self) -> tuple[FloatArray, FloatArray]:
+        """Return weights and derivatives at the nodes of a quadrature of the first half."""
+        times, weights = half_quadrature(self.law.rates)
+        return weights, self.jet(times, 2.0 - times)
+
+
+def rounded(coefficients: FloatArray) -> FloatArray:
+    """Return numbers to `KEY_BITS` leading bits, by Dekker's splitting."""
+    shifted = coefficients * (2.0 ** (53 - KEY_BITS) + 1.0)
+    result: FloatArray = shifted - (shifted - coefficients)
+    return result
+
+
+def unit_motion(coefficients: FloatArray) -> UnitMotion:
+    """
+    Return the unit motion of an equation, one that is known if its numbers are the same.
+
+    Parameters
+    ----------
+    coefficients
+        a_0 ... a_6 in normalised time, shape (7,) [-].
+
+    Raises
+    ------
+    UncertifiedPlan
+        The boundary conditions are singular in double precision.
+
+    """
+    kept = kept_units(rounded(coefficients).tobytes())
+    for unit in kept:
+        if (np.abs(unit.coefficients - coefficients) <= SAME * np.abs(coefficients)).all():
+            return unit
+    unit = _certified(coefficients)
+    # In one step: threads that come together compute the same and one of them is kept.
+    kept[:] = [unit]
+    return unit
+
+
+@lru_cache(maxsize=UNITS_KEPT)
+def kept_units(key: bytes) -> list[UnitMotion]:
+    """Return the last unit motion that was found under some leading bits, if there is one."""
+    del key
+    return []
+
+
+def unit_terms(coefficients: FloatArray) -> tuple[Term, ...]:
+    """Return the terms of the stationary law from rest at -1/2 to rest at 1/2; it is odd."""
+    return tuple(_BoundarySolver(clusters(coefficients), -1.0).terms(_UNIT_ENDS[:, 1]))
+
+
+def _certified(coefficients: FloatArray) -> UnitMotion:
+    """Return a unit motion with its residuals."""
+    law = ExponentialLaw(duration=2.0, terms=unit_terms(coefficients))
+    jet = law.normalised_jet(probes(), 2 * CONDITIONS)
+    peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
+    # Relative to the start, as the value's own peak is the distance.
+    sizes = peaks[:CONDITIONS] + _UNIT_ENDS[:, 1]
+    miss = np.abs(jet[:CONDITIONS, [0, -1]] - _UNIT_ENDS) / sizes[:, None]
+    return UnitMotion(
+        coefficients=coefficients,
+        law=law,
+        boundary_residual=float(miss.max()),
+        optimality_residual=stationarity_residual(coefficients, jet) + SAME,
+        costate=float(costate(coefficients, jet[:, -2])),
+        peaks=peaks,
+    )
+
+
+@cache
+def probes() -> FloatArray:
+    """
+    Return x + 1 and 1 - x at times that crowd towards the start as fast as boundary layers can.
+
+    Those from 0 to 1, of which one half of a motion has enough, and last the end, 2.
+    """
+    layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
+    times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
+    times = np.append(times, 2.0)
+    return np.array([times, 2.0 - times])

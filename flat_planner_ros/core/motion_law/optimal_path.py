@@ -25,14 +25,16 @@ from functools import cache
 from math import ceil, log2
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, strict_arithmetic
-from flat_planner_ros.core.motion_law.basis import CONDITIONS
+from flat_planner_ros.core.motion_law.basis import (
+    CONDITIONS,
+    segment_basis,
+    SegmentBasis,
+    SOLUTIONS,
+)
+from flat_planner_ros.core.motion_law.continuity import Amplitudes, continuity_system
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
-from flat_planner_ros.core.motion_law.coupling import coupling, Weights
-from flat_planner_ros.core.motion_law.extremal import costate, stationarity_residual
-from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE
-from flat_planner_ros.core.motion_law.piecewise_law import PiecewiseLaw
-from flat_planner_ros.core.motion_law.segment_basis import segment_basis, SegmentBasis, SOLUTIONS
-from flat_planner_ros.core.motion_law.unit_motion import rounded
+from flat_planner_ros.core.motion_law.extremal import costate, rounded, stationarity_residual
+from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE, PiecewiseLaw
 import numpy as np
 
 PROBES = 8
@@ -140,44 +142,59 @@ def _optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
     # segment far from zero loses no digits.
     origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
     steps = path.values - origins
-    weights, correction = _weights(bases, halves, path, steps)
-    # Times are rounded: a segment's length is known to this part of it, and slopes with it.
-    boundary = float(np.finfo(float).eps * path.edges[-1] / (2.0 * halves.min()))
-    laws, value, optimality = [], 0.0, 0.0
-    slopes = np.zeros(len(bases) - 1)
-    for variable, relaxation in enumerate(path.relaxations):
-        segments = tuple(
-            ExponentialLaw(duration=2.0 * half, modes=basis.modes(weight), offset=origin)
-            for basis, half, weight, origin in zip(
-                bases, halves, weights[:, :, variable], origins[variable], strict=True
+    amplitudes = _amplitudes(bases, halves, path, steps)
+    parts = []
+    for variable, (origin, step) in enumerate(zip(origins, steps, strict=True)):
+        laws = tuple(
+            ExponentialLaw(duration=2.0 * half, terms=basis.combined(values), offset=place)
+            for basis, half, values, place in zip(
+                bases, halves, amplitudes.values[:, :, variable], origin, strict=True
             )
         )
-        laws.append(PiecewiseLaw(edges=path.edges, laws=segments))
-        jets = [_probed(law, basis) for law, basis in zip(segments, bases, strict=True)]
-        # Constant along each segment: taken in its middle.
-        costates = np.array([costate(coefficients, jet[:, -1:])[0] for jet in jets])
-        value += costates @ steps[variable] - _share_of_start(cost, jets[0][:, 0])
-        joints = np.array([jet[:, 1] for jet in jets[:-1]]).reshape(-1, SOLUTIONS + 1)
-        slopes += 2.0 * np.diff(costates) * (joints[:, 1] + relaxation * joints[:, 2])
-        peaks = _peaks(path.start[variable, 0], jets)
-        if not peaks.max() < MAX_DERIVATIVE:
-            raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
-        boundary = max(
-            boundary,
-            _relative(correction[:, variable], peaks[: CONDITIONS + 1]),
-            _boundary_residual(path, variable, jets, peaks[:CONDITIONS]),
-        )
-        optimality = max(
-            optimality,
-            _natural_residual(float(relaxation), jets, peaks),
-            *(stationarity_residual(coefficients, jet) for jet in jets),
-        )
+        jets = [_probed(law, basis) for law, basis in zip(laws, bases, strict=True)]
+        correction = amplitudes.correction[:, variable]
+        parts.append(_certified(cost, path, variable, laws, jets, step, correction))
+    # Times are rounded: a segment's length is known to this part of it, and slopes with it.
+    rounding = float(np.finfo(float).eps * path.edges[-1] / (2.0 * halves.min()))
     return OptimalPath(
-        laws=tuple(laws),
-        cost_value=float(value),
-        time_slopes=slopes,
-        boundary_residual=boundary,
-        optimality_residual=optimality,
+        laws=tuple(law for part in parts for law in part.laws),
+        cost_value=sum(part.cost_value for part in parts),
+        time_slopes=np.sum([part.time_slopes for part in parts], axis=0),
+        boundary_residual=max(rounding, *(part.boundary_residual for part in parts)),
+        optimality_residual=max(part.optimality_residual for part in parts),
+    )
+
+
+def _certified(
+    cost: QuadraticCost,
+    path: PathConditions,
+    variable: int,
+    laws: tuple[ExponentialLaw, ...],
+    jets: Sequence[FloatArray],
+    steps: FloatArray,
+    correction: FloatArray,
+) -> OptimalPath:
+    """Return one variable's law with its share of the cost and the residuals of its jets."""
+    coefficients = cost.characteristic()
+    relaxation = float(path.relaxations[variable])
+    # Constant along each segment: taken in its middle.
+    costates = np.array([costate(coefficients, jet[:, -1:])[0] for jet in jets])
+    knots = np.array([jet[:, 1] for jet in jets[:-1]]).reshape(-1, SOLUTIONS + 1)
+    peaks = _peaks(path.start[variable, 0], jets)
+    if not peaks.max() < MAX_DERIVATIVE:
+        raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
+    return OptimalPath(
+        laws=(PiecewiseLaw(edges=path.edges, laws=laws),),
+        cost_value=float(costates @ steps - _share_of_start(cost, jets[0][:, 0])),
+        time_slopes=2.0 * np.diff(costates) * (knots[:, 1] + relaxation * knots[:, 2]),
+        boundary_residual=max(
+            _relative(correction, peaks[: CONDITIONS + 1]),
+            _boundary_residual(path, variable, jets, peaks[:CONDITIONS]),
+        ),
+        optimality_residual=max(
+            _natural_residual(relaxation, jets, peaks),
+            *(stationarity_residual(coefficients, jet) for jet in jets),
+        ),
     )
 
 
@@ -190,19 +207,19 @@ def _reference(coefficients: FloatArray) -> FloatArray:
     return reference
 
 
-def _weights(
+def _amplitudes(
     bases: Sequence[SegmentBasis], halves: FloatArray, path: PathConditions, steps: FloatArray
-) -> Weights:
-    """Return the weights of all solutions; equal relaxations share one factorisation."""
-    weights = np.empty((len(bases), SOLUTIONS, len(steps)))
+) -> Amplitudes:
+    """Return the amplitudes of all solutions; equal relaxations share one factorisation."""
+    values = np.empty((len(bases), SOLUTIONS, len(steps)))
     correction = np.empty((CONDITIONS + 1, len(steps)))
     for relaxation in np.unique(path.relaxations):
         alike = path.relaxations == relaxation
-        system = coupling(bases, halves, float(relaxation))
+        system = continuity_system(bases, halves, float(relaxation))
         found = system.solve(path.start[alike, 1:].T, steps[alike].T)
-        weights[:, :, alike] = found.weights
+        values[:, :, alike] = found.values
         correction[:, alike] = found.correction
-    return Weights(weights, correction)
+    return Amplitudes(values, correction)
 
 
 def _probed(law: ExponentialLaw, basis: SegmentBasis) -> FloatArray:

@@ -20,7 +20,6 @@ from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViola
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning.planner import plan
-from flat_planner_ros.core.planning.reference_trajectory import Law
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,
@@ -48,7 +47,6 @@ __all__ = [
     'Extrema',
     'extrema_of',
     'JointLimits',
-    'Law',
     'LimitUse',
     'MotionRequest',
     'NoFeasibleDuration',

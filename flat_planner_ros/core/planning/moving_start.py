@@ -103,4 +103,4 @@ def _jet(law: ExponentialLaw) -> FloatArray:
     """Return the derivatives 0 to 12 in normalised time where laws are certified, (13, m)."""
     near = probes()[0, :-1]
     after_start = np.concatenate([[0.0], near, 2.0 - near[::-1], [2.0]])
-    return law.terms.at(np.array([after_start, after_start[::-1]]), 2 * CONDITIONS)
+    return law.normalised_jet(np.array([after_start, after_start[::-1]]), 2 * CONDITIONS)

@@ -30,7 +30,6 @@ from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Pl
 from flat_planner_ros.core.planning.moving_start import laws_to_rest
 from flat_planner_ros.core.planning.problem import MotionProblem, problem_of
 from flat_planner_ros.core.planning.reference_trajectory import (
-    Law,
     LawTrajectory,
     ReferenceTrajectory,
     RestToRestTrajectory,
@@ -45,7 +44,7 @@ from flat_planner_ros.core.planning.shaped_trajectory import shaped_trajectory
 from flat_planner_ros.core.planning.via_times import path_of
 import numpy as np
 
-__all__ = ['Law', 'MotionRequest', 'Plan', 'plan', 'PlanningOptions', 'PlanSamples', 'ViaPoint']
+__all__ = ['MotionRequest', 'Plan', 'plan', 'PlanningOptions', 'PlanSamples', 'ViaPoint']
 
 
 NO_DISTANCE = 1e-100

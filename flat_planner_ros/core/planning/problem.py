@@ -20,9 +20,7 @@ from functools import cached_property, lru_cache
 from flat_planner_ros.core.arm import flat_map, FlatMap, FloatArray, PlanarArm, strict_arithmetic
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
-    GRIDS_KEPT,
     JET_ORDER,
-    MAX_KEPT_INTERVALS,
     QuadraticCost,
     strategy_cost,
     unit_motion,
@@ -30,13 +28,18 @@ from flat_planner_ros.core.motion_law import (
 )
 from flat_planner_ros.core.planning.request import PlanningOptions
 import numpy as np
-from numpy.typing import NDArray
 
 MAX_NUMBER = 1e300
 """Largest number in a plan; products with weights of order one still have room."""
 
 PROBLEMS_KEPT = 64
 """Combinations of arm, options and duration whose unit motion is remembered."""
+
+GRIDS_KEPT = 32
+"""Sampled unit motions in the cache."""
+
+MAX_KEPT_INTERVALS = 10_000
+"""Longest grid that is kept; with `GRIDS_KEPT` it bounds the caches to 24 MB."""
 
 _ORDERS = np.arange(JET_ORDER + 1.0)
 
@@ -75,11 +78,6 @@ class MotionProblem:
     rates: FloatArray
     cost_value: float
     reach: float
-
-    @property
-    def rates_of_modes(self) -> NDArray[np.complex128]:
-        """Return the characteristic roots that the unit motion is made of, (m,) [2 / duration]."""
-        return np.array([mode.rate for mode in self.unit.law.modes])
 
     @cached_property
     def rows(self) -> FloatArray:

@@ -24,26 +24,9 @@ from functools import cached_property
 from typing import NamedTuple, Protocol
 
 from flat_planner_ros.core.arm import apply_row, FloatArray
-from flat_planner_ros.core.motion_law import (
-    CONDITIONS,
-    ExponentialLaw,
-    JET_ORDER,
-    motion_quadrature,
-)
+from flat_planner_ros.core.motion_law import CONDITIONS, JET_ORDER, Law, motion_quadrature
 from flat_planner_ros.core.planning.problem import even_times, MotionProblem
 import numpy as np
-from numpy.typing import ArrayLike
-
-
-class Law(Protocol):
-    """A planned variable as a function of time."""
-
-    @property
-    def duration(self) -> float:
-        """Return the length of the motion [s]."""
-
-    def jet(self, t: ArrayLike, order: int, /) -> FloatArray:
-        """Return the value and its derivatives up to an order, shape (order + 1, m)."""
 
 
 class Samples(NamedTuple):
@@ -103,12 +86,7 @@ class RestToRestTrajectory:
     def laws(self) -> tuple[Law, ...]:
         """Return the law of each planned variable."""
         return tuple(
-            ExponentialLaw(
-                duration=self.problem.duration,
-                modes=self.problem.unit.law.modes,
-                factor=distance,
-                offset=0.5 * (start + final),
-            )
+            self.problem.unit.law_over(self.problem.duration, distance, 0.5 * (start + final))
             for distance, start, final in zip(self.distances, self.start, self.final, strict=True)
         )
 
@@ -155,7 +133,7 @@ class RestToRestTrajectory:
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
         travel = sum(abs(distance) for distance in self.distances)
-        return motion_quadrature(self.problem.rates_of_modes, travel, self.edges)
+        return motion_quadrature(self.problem.unit.law.rates, travel, self.edges)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,4 +196,4 @@ class LawTrajectory:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
         places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
         travel = float(np.abs(np.diff(places)).sum())
-        return motion_quadrature(self.problem.rates_of_modes, travel, self.edges)
+        return motion_quadrature(self.problem.unit.law.rates, travel, self.edges)

@@ -17,9 +17,9 @@
 from typing import NamedTuple
 
 from flat_planner_ros.core.insensitive import insensitive_motion, Insensitivity
-from flat_planner_ros.core.motion_law import CONDITIONS, ExponentialLaw
+from flat_planner_ros.core.motion_law import CONDITIONS
 from flat_planner_ros.core.planning.problem import MotionProblem
-from flat_planner_ros.core.planning.reference_trajectory import Law, LawTrajectory
+from flat_planner_ros.core.planning.reference_trajectory import LawTrajectory
 import numpy as np
 
 
@@ -62,21 +62,15 @@ def shaped_trajectory(
     """
     distance = final[0] - start[0]
     shaped = insensitive_motion(problem.arm, problem.duration, wanted, distance)
-    laws: list[Law] = [shaped.law.over(distance, 0.5 * (start[0] + final[0]))]
-    for begin, end in zip(start[1:], final[1:], strict=True):
-        laws.append(
-            ExponentialLaw(
-                duration=problem.duration,
-                modes=problem.unit.law.modes,
-                factor=end - begin,
-                offset=0.5 * (begin + end),
-            )
-        )
+    others = (
+        problem.unit.law_over(problem.duration, end - begin, 0.5 * (begin + end))
+        for begin, end in zip(start[1:], final[1:], strict=True)
+    )
     rest = np.zeros((len(start), CONDITIONS))
     rest[:, 0] = start
     trajectory = LawTrajectory(
         problem=problem,
-        laws=tuple(laws),
+        laws=(shaped.law.transformed(distance, 0.5 * (start[0] + final[0])), *others),
         start=rest,
         final=np.array(final),
         edges=(0.0, problem.duration),

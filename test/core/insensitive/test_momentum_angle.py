@@ -88,7 +88,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
 def test_derivatives_are_derivatives(share):
     fourth, second, _ = random_law(8)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
-    law = response(fourth, second, flat_map(ARM, FlatModel.EXACT), duration).over(2.0, 0.3)
+    law = response(fourth, second, flat_map(ARM, FlatModel.EXACT), duration).transformed(2.0, 0.3)
     t, h = np.linspace(0.1, 0.9, 9) * duration, 1e-5 * duration
     jet, after, before = law.jet(t, 8), law.jet(t + h, 8), law.jet(t - h, 8)
     slope = (after - before) / (2.0 * h)

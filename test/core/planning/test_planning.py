@@ -33,7 +33,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-unit_motion = import_module('flat_planner_ros.core.motion_law.unit_motion')
+extremals = import_module('flat_planner_ros.core.motion_law.extremal')
 
 REFERENCE = json.loads(
     (Path(__file__).parents[2] / 'reference' / 'motion_laws.json').read_text('utf-8')
@@ -259,7 +259,7 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, const
 @pytest.mark.parametrize('damage', ['end', 'middle'])
 def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
     """A law for other ends misses the boundary, one for another cost the optimality."""
-    compute = unit_motion.unit_modes
+    compute = extremals.unit_terms
     # A problem that no other test has: nothing of it is in the cache.
     arm = paper_arm_with(2e-5)
 
@@ -269,11 +269,11 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
         end = 0.5 * np.eye(6)[0]
         return extremal(
             coefficients, 2.0, BoundaryConditions(start=-end, end=end * (1.0 + 1e-8))
-        ).modes
+        ).terms
 
-    monkeypatch.setattr(unit_motion, 'unit_modes', wrong)
-    unit_motion.kept_units.cache_clear()
-    request.addfinalizer(unit_motion.kept_units.cache_clear)
+    monkeypatch.setattr(extremals, 'unit_terms', wrong)
+    extremals.kept_units.cache_clear()
+    request.addfinalizer(extremals.kept_units.cache_clear)
     quantity = {'end': 'boundary', 'middle': 'optimality'}[damage]
     with pytest.raises(UncertifiedPlan, match=quantity):
         plan(half_turn(), arm, STRATEGIES['energy'])
@@ -521,10 +521,10 @@ def test_another_distance_and_a_scaled_arm_share_a_unit_motion():
 
 def test_rounding_of_coefficients_is_bounded():
     values = np.random.default_rng(5).normal(size=1000) * 1e7
-    error = np.abs(unit_motion.rounded(values) - values)
-    assert (error <= 2.0**-unit_motion.KEY_BITS * np.abs(values)).all()
+    error = np.abs(extremals.rounded(values) - values)
+    assert (error <= 2.0**-extremals.KEY_BITS * np.abs(values)).all()
     assert error.max() > 0.0
-    assert len(np.unique(unit_motion.rounded(1.0 + np.arange(32) * 2.0**-52))) <= 3
+    assert len(np.unique(extremals.rounded(1.0 + np.arange(32) * 2.0**-52))) <= 3
 
 
 @pytest.mark.parametrize(

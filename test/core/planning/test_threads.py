@@ -27,7 +27,7 @@ from flat_planner_ros.core.planning.request import MotionRequest, PlanningOption
 import numpy as np
 import pytest
 
-unit_motion = import_module('flat_planner_ros.core.motion_law.unit_motion')
+extremals = import_module('flat_planner_ros.core.motion_law.extremal')
 
 THREADS = 4
 
@@ -73,7 +73,7 @@ def test_plans_of_several_threads_are_the_same_as_of_one():
             found = [pool.submit(together, arm, options, duration) for _ in range(THREADS)]
             # Alone, and nothing known.
             problem.problem_of.cache_clear()
-            unit_motion.kept_units.cache_clear()
+            extremals.kept_units.cache_clear()
             expected = results(arm, options, duration)
             for each in found:
                 for ours, alone in zip(each.result(), expected, strict=True):

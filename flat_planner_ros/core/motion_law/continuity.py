@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-Coupling of segments at via points: one banded linear system for a whole path.
+Continuity of segments at via points: one banded linear system for a whole path.
 
-Unknown are the weights of every segment's twelve solutions; equations are the conditions at the
-start, at each via point and at the end ((V5) of docs/derivation.md). Weights rather than the
-jets at the via points, because two points close to each other fix the jets between them far more
-stiffly than their neighbours do: in the jets' normal equations the neighbours drown, here each
-condition keeps its own scale.
+Unknown are the amplitudes of every segment's twelve solutions; equations are the conditions at the
+start, at each knot (a via point) and at the end ((V5) of docs/derivation.md). Amplitudes rather
+than the jets at the knots, because two knots close to each other fix the jets between them far
+more stiffly than their neighbours do: in the jets' normal equations the neighbours drown, here
+each condition keeps its own scale.
 """
 
 from collections.abc import Sequence
@@ -28,39 +28,38 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law.basis import CONDITIONS
-from flat_planner_ros.core.motion_law.segment_basis import SegmentBasis, SOLUTIONS
+from flat_planner_ros.core.motion_law.basis import CONDITIONS, SegmentBasis, SOLUTIONS
 import numpy as np
 
 RESIDUAL_STEPS = 3
-"""Corrections of the solved weights by the residual of the conditions."""
+"""Corrections of the solved amplitudes by the residual of the conditions."""
 
 BAND = SOLUTIONS + CONDITIONS - 1
 """Diagonals on either side of the main one that are occupied."""
 
 
-class Weights(NamedTuple):
+class Amplitudes(NamedTuple):
     """
-    Weights of all solutions, and how far they are settled.
+    Amplitudes of all solutions, and how far they are settled.
 
     Attributes
     ----------
-    weights
-        Of every segment, whose value at its start counts as 0, shape (p, 12, m).
+    values
+        Those of every segment, whose value at its start counts as 0, shape (p, 12, m).
     correction
         What the last correction still changed: largest derivatives 0 to 6 at the segments' ends,
         shape (7, m). Each correction is smaller than the one before by about the same factor, so
         it bounds the error even where the conditions are nearly dependent, and their residuals
-        small whatever the weights.
+        small whatever the amplitudes.
 
     """
 
-    weights: FloatArray
+    values: FloatArray
     correction: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Coupling:
+class ContinuitySystem:
     """
     The conditions on p segments, as blocks of one matrix.
 
@@ -70,29 +69,29 @@ class Coupling:
         Derivatives 0 to 6 of every solution at its segment's start and end, shape (p, 2, 7, 12).
     start, end
         Derivatives 0 to 5 at both ends, on the first and the last segment, shape (6, 12).
-    joints
-        Conditions at every via point, on the segments before and after it, shape
+    knots
+        Conditions at every knot, on the segments before and after it, shape
         (p - 1, 12, 24): the two values, continuity of the derivatives 1 to 9, and that of
         w^(10) + relaxation w^(11).
-    start_factors, joint_factors, end_factors
+    start_factors, knot_factors, end_factors
         By which the conditions have been multiplied, shapes (6,), (p - 1, 12), (6,).
     column_factors
-        By which the weights have been divided, shape (p, 12).
+        By which the amplitudes have been divided, shape (p, 12).
 
     """
 
     ends: FloatArray
     start: FloatArray
-    joints: FloatArray
+    knots: FloatArray
     end: FloatArray
     start_factors: FloatArray
-    joint_factors: FloatArray
+    knot_factors: FloatArray
     end_factors: FloatArray
     column_factors: FloatArray
 
-    def solve(self, start: FloatArray, steps: FloatArray) -> Weights:
+    def solve(self, start: FloatArray, steps: FloatArray) -> Amplitudes:
         """
-        Return the weights of all solutions.
+        Return the amplitudes of all solutions.
 
         Parameters
         ----------
@@ -113,17 +112,17 @@ class Coupling:
         factors, pivots, failure = dgbtrf(self._banded(), BAND, BAND)
         if failure:
             raise UncertifiedPlan('boundary residual', inf, 0.0)
-        weights, _ = dgbtrs(factors, BAND, BAND, target, pivots)
+        amplitudes, _ = dgbtrs(factors, BAND, BAND, target, pivots)
         for _ in range(RESIDUAL_STEPS):
-            residual = target - self._applied(weights)
+            residual = target - self._applied(amplitudes)
             change, _ = dgbtrs(factors, BAND, BAND, residual, pivots)
-            weights += change
+            amplitudes += change
         at_ends = self.ends @ self._unscaled(change)[:, None]
-        return Weights(self._unscaled(weights), np.abs(at_ends).max(axis=(0, 1)))
+        return Amplitudes(self._unscaled(amplitudes), np.abs(at_ends).max(axis=(0, 1)))
 
-    def _unscaled(self, weights: FloatArray) -> FloatArray:
-        """Return weights of the solutions themselves, shape (p, 12, m)."""
-        columns = weights.reshape(*self.column_factors.shape, -1)
+    def _unscaled(self, amplitudes: FloatArray) -> FloatArray:
+        """Return amplitudes of the solutions themselves, shape (p, 12, m)."""
+        columns = amplitudes.reshape(*self.column_factors.shape, -1)
         unscaled: FloatArray = columns * self.column_factors[:, :, None]
         return unscaled
 
@@ -131,7 +130,7 @@ class Coupling:
         """Return the right-hand side, shape (12 p, m)."""
         target = np.zeros((SOLUTIONS * len(steps), steps.shape[1]))
         target[1:CONDITIONS] = start * self.start_factors[1:, None]
-        target[CONDITIONS:-CONDITIONS:SOLUTIONS] = steps[:-1] * self.joint_factors[:, :1]
+        target[CONDITIONS:-CONDITIONS:SOLUTIONS] = steps[:-1] * self.knot_factors[:, :1]
         target[-CONDITIONS] = steps[-1] * self.end_factors[0]
         return target
 
@@ -146,21 +145,23 @@ class Coupling:
             banded[2 * BAND + rows - columns, columns] = block
 
         put(self.start, 0, 0)
-        for index, block in enumerate(self.joints):
+        for index, block in enumerate(self.knots):
             put(block, CONDITIONS + SOLUTIONS * index, SOLUTIONS * index)
         put(self.end, size - CONDITIONS, size - SOLUTIONS)
         return banded
 
-    def _applied(self, weights: FloatArray) -> FloatArray:
+    def _applied(self, amplitudes: FloatArray) -> FloatArray:
         """Return the matrix times some columns, shape (12 p, m)."""
-        columns = weights.reshape(-1, SOLUTIONS, weights.shape[1])
-        joints = self.joints[:, :, :SOLUTIONS] @ columns[:-1]
-        joints += self.joints[:, :, SOLUTIONS:] @ columns[1:]
-        inner = joints.reshape(-1, weights.shape[1])
+        columns = amplitudes.reshape(-1, SOLUTIONS, amplitudes.shape[1])
+        knots = self.knots[:, :, :SOLUTIONS] @ columns[:-1]
+        knots += self.knots[:, :, SOLUTIONS:] @ columns[1:]
+        inner = knots.reshape(-1, amplitudes.shape[1])
         return np.concatenate([self.start @ columns[0], inner, self.end @ columns[-1]])
 
 
-def coupling(bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: float) -> Coupling:
+def continuity_system(
+    bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: float
+) -> ContinuitySystem:
     """
     Return the conditions on the segments of a path.
 
@@ -180,37 +181,37 @@ def coupling(bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: floa
     rates = np.array([basis.rates for basis in bases]) / halves[:, None]
     start_factors, end_factors = _end_factors(rates[0]), _end_factors(rates[-1])
     # The faster segment's rates: only it can fulfil the conditions on high derivatives.
-    joint_factors = _joint_factors(np.maximum(rates[:-1], rates[1:]))
+    knot_factors = _knot_factors(np.maximum(rates[:-1], rates[1:]))
     start = at_start[0, :CONDITIONS] * start_factors[:, None]
     end = at_end[-1, :CONDITIONS] * end_factors[:, None]
-    joints = np.zeros((len(bases) - 1, SOLUTIONS, 2 * SOLUTIONS))
-    _fill_joints(joints[:, :, :SOLUTIONS], at_end[:-1], relaxation, 0)
-    _fill_joints(joints[:, :, SOLUTIONS:], -at_start[1:], relaxation, 1)
-    joints *= joint_factors[:, :, None]
+    knots = np.zeros((len(bases) - 1, SOLUTIONS, 2 * SOLUTIONS))
+    _fill_knots(knots[:, :, :SOLUTIONS], at_end[:-1], relaxation, 0)
+    _fill_knots(knots[:, :, SOLUTIONS:], -at_start[1:], relaxation, 1)
+    knots *= knot_factors[:, :, None]
     largest = np.zeros((len(bases), SOLUTIONS))
-    sizes = np.abs(joints).max(axis=1)
+    sizes = np.abs(knots).max(axis=1)
     largest[:-1] = sizes[:, :SOLUTIONS]
     np.maximum(largest[1:], sizes[:, SOLUTIONS:], out=largest[1:])
     np.maximum(largest[0], np.abs(start).max(axis=0), out=largest[0])
     np.maximum(largest[-1], np.abs(end).max(axis=0), out=largest[-1])
     columns = 1.0 / largest
-    joints[:, :, :SOLUTIONS] *= columns[:-1, None]
-    joints[:, :, SOLUTIONS:] *= columns[1:, None]
+    knots[:, :, :SOLUTIONS] *= columns[:-1, None]
+    knots[:, :, SOLUTIONS:] *= columns[1:, None]
     ends = np.stack([at_start, at_end], axis=1)[:, :, : CONDITIONS + 1]
-    return Coupling(
+    return ContinuitySystem(
         ends=ends,
         start=start * columns[0],
-        joints=joints,
+        knots=knots,
         end=end * columns[-1],
         start_factors=start_factors,
-        joint_factors=joint_factors,
+        knot_factors=knot_factors,
         end_factors=end_factors,
         column_factors=columns,
     )
 
 
-def _fill_joints(half: FloatArray, table: FloatArray, relaxation: float, row: int) -> None:
-    """Write the conditions on one side of every joint; its value stands in the given row."""
+def _fill_knots(half: FloatArray, table: FloatArray, relaxation: float, row: int) -> None:
+    """Write the conditions on one side of every knot; its value stands in the given row."""
     half[:, row] = table[:, 0] + relaxation * table[:, 1]
     half[:, 2:-1] = table[:, 1:-2]
     half[:, -1] = table[:, -2] + relaxation * table[:, -1]
@@ -222,9 +223,9 @@ def _end_factors(rates: FloatArray) -> FloatArray:
     return np.concatenate([[1.0], np.cumprod(steps)])
 
 
-def _joint_factors(rates: FloatArray) -> FloatArray:
+def _knot_factors(rates: FloatArray) -> FloatArray:
     """
-    Return factors of the conditions at joints, as `_end_factors` for two solutions of each rate.
+    Return factors of the conditions at knots, as `_end_factors` for two solutions of each rate.
 
     Slow solutions of the two segments meet the values, and the pair of the i-th rate the
     derivatives 2 i - 3 and 2 i - 2 ((V6) of docs/derivation.md).

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Modes: the terms of a motion law, and their evaluation for all derivatives at once.
+Terms of a motion law, and their evaluation for all derivatives at once.
 
-A mode is an exponential (growing or decaying, perhaps oscillating) times a polynomial: the general
+A term is an exponential (growing or decaying, perhaps oscillating) times a polynomial: the general
 solution of a linear equation with constant coefficients ((24) of docs/derivation.md). Nearly all
 are plain exponentials anchored at an end, so that one matrix product gives every derivative at
 every time; the others are summed one by one.
@@ -50,16 +50,15 @@ BLOCK = 64
 CHUNK = 32 * BLOCK
 """Times of an even grid evaluated together, few enough for the cache of the processor."""
 
+BLOCKS_KEPT = 4
+"""Blocks of even grids that are remembered."""
 
-PLACES_KEPT = 4
-"""Even grids that are remembered."""
 
-
-class Mode(NamedTuple):
+class Term(NamedTuple):
     """
     Real part of exp(rate (x - origin)) * sum_k coefficients[k] (x - origin)^k.
 
-    Normalised time x runs from -1 to 1. The origin is the end where the mode is largest, so that
+    Normalised time x runs from -1 to 1. The origin is the end where the term is largest, so that
     no exponential overflows.
 
     Attributes
@@ -77,11 +76,11 @@ class Mode(NamedTuple):
     origin: int
     coefficients: tuple[complex, ...]
 
-    def mirrored(self, sign: float) -> 'Mode':
-        """Return sign times the mode run backwards, x -> -x."""
+    def mirrored(self, sign: float) -> 'Term':
+        """Return sign times the term run backwards, x -> -x."""
         signs = (sign, -sign)
         coefficients = tuple([signs[k % 2] * c for k, c in enumerate(self.coefficients)])
-        return Mode(-self.rate, -self.origin, coefficients)
+        return Term(-self.rate, -self.origin, coefficients)
 
     def derivatives(self, order: int) -> ComplexArray:
         """Return the coefficients of the derivatives in x, shape (terms, order + 1)."""
@@ -90,9 +89,9 @@ class Mode(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ModeSum:
+class TermSum:
     """
-    Sum of modes, sorted by the way they are evaluated; all tables are in normalised time x.
+    Sum of terms, sorted by the way they are evaluated; all tables are in normalised time x.
 
     Attributes
     ----------
@@ -103,13 +102,13 @@ class ModeSum:
         For every derivative: of Re and -Im of each of these exponentials, with u = x + 1 and with
         u = 1 - x, and of ascending powers of x, shape (orders, 4 m + terms).
     others
-        Modes with both an exponential and powers, with their `Mode.derivatives`.
+        Terms with both an exponential and powers, with their `Term.derivatives`.
 
     """
 
     decays: ComplexArray
     factors: FloatArray
-    others: tuple[tuple[Mode, ComplexArray], ...]
+    others: tuple[tuple[Term, ComplexArray], ...]
 
     def at(self, distances: FloatArray, order: int) -> FloatArray:
         """
@@ -156,10 +155,11 @@ class ModeSum:
         """
         orders, intervals = len(table), table.shape[1] - 1
         count, half = len(self.decays), intervals // 2 + 1
-        size, places, x = even_places(intervals)
+        size, places, x = grid_blocks(intervals)
         factors = scales[:, None] * self.factors[:orders]
         amplitudes = factors[:, None, : 4 * count].view(complex)
-        signs, mirrored = _odd_signs(orders), table[:, ::-1]
+        signs = _odd_signs(orders)
+        mirrored = table[:, ::-1]
         with np.errstate(under='ignore'):
             fine, coarse = self._grid_tables(size, places)
             for start in range(0, half, CHUNK):
@@ -203,40 +203,47 @@ class ModeSum:
     def _add_others(
         self, result: FloatArray, distances: FloatArray, scales: FloatArray | None = None
     ) -> None:
-        """Add the modes that have both an exponential and powers."""
+        """Add the terms that have both an exponential and powers."""
         after_start, before_end = distances
-        for mode, table in self.others:
-            u = (0.5 * (after_start - before_end), -before_end, after_start)[mode.origin]
+        from_origin = {
+            -1: after_start,
+            0: 0.5 * (after_start - before_end),
+            1: -before_end,
+        }
+        for term, table in self.others:
+            u = from_origin[term.origin]
             powers = np.empty((len(table), len(u)))
             _fill_powers(powers, u)
-            values = (table[:, : len(result)].T @ powers) * np.exp(mode.rate * u)
+            values = (table[:, : len(result)].T @ powers) * np.exp(term.rate * u)
             result += values.real if scales is None else scales[:, None] * values.real
 
 
-def mode_sum(modes: Sequence[Mode], order: int = TOP_ORDER) -> ModeSum:
-    """Return the sum of modes, ready for derivatives up to an order."""
+def term_sum(terms: Sequence[Term], order: int = TOP_ORDER) -> TermSum:
+    """Return the sum of terms, ready for derivatives up to an order."""
     series: list[tuple[complex, ...]] = []
-    others: list[tuple[Mode, ComplexArray]] = []
+    others: list[tuple[Term, ComplexArray]] = []
     ends: dict[complex, list[complex]] = {}  # decay: amplitudes at start and end
-    for mode in modes:
-        rate, origin, coefficients = mode
+    for term in terms:
+        rate, origin, coefficients = term
         if origin == 0 and rate == 0.0:
             series.append(coefficients)
         elif origin != 0 and len(coefficients) == 1:
-            ends.setdefault(origin * rate, [0j, 0j])[origin > 0] += coefficients[0]
+            amplitudes = ends.setdefault(origin * rate, [0j, 0j])
+            amplitudes[0 if origin < 0 else 1] += coefficients[0]
         else:
-            others.append((mode, mode.derivatives(order)))
+            others.append((term, term.derivatives(order)))
     decays = np.array(list(ends), dtype=complex)
     table = np.empty((order + 1, len(decays), 2), dtype=complex)
     if len(decays):
         table[0] = list(ends.values())
         # Counted from the start, an exponential that falls has the rate -d.
-        table[1:, :, 0], table[1:, :, 1] = -decays, decays
+        table[1:, :, 0] = -decays
+        table[1:, :, 1] = decays
         np.multiply.accumulate(table, out=table)
     factors = table.reshape(order + 1, 2 * len(decays)).view(float)
     if series:
         factors = np.concatenate([factors, _power_table(series, order)], axis=1)
-    return ModeSum(decays=decays, factors=factors, others=tuple(others))
+    return TermSum(decays=decays, factors=factors, others=tuple(others))
 
 
 def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
@@ -267,15 +274,17 @@ def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
 
 def _power_table(series: Sequence[tuple[complex, ...]], order: int) -> FloatArray:
     """Return the coefficients of the derivatives of a sum of power series, powers in columns."""
-    terms = zip_longest(*series, fillvalue=0j)
-    total = np.array([sum(coefficients).real for coefficients in terms])
+    alike = zip_longest(*series, fillvalue=0j)
+    total = np.array([sum(coefficients).real for coefficients in alike])
     return _trimmed(series_derivatives(total, order), 1.0).T
 
 
 def leibniz(rate: complex, order: int) -> ComplexArray:
     """Return the factors of f, f', ... in the derivatives of exp(rate u) f at exp(rate u) = 1."""
     powers = np.empty(order + 2, dtype=complex)
-    powers[0], powers[1:-1], powers[-1] = 1.0, rate, 0.0
+    powers[0] = 1.0
+    powers[1:-1] = rate
+    powers[-1] = 0.0
     np.multiply.accumulate(powers, out=powers)
     binomials, index = _pascal(order)
     factors: ComplexArray = powers[index]
@@ -330,14 +339,14 @@ def _split(fall: ComplexArray, parts: FloatArray) -> None:
     np.negative(fall.imag, out=parts[..., 1, :])
 
 
-class EvenPlaces(NamedTuple):
+class GridBlocks(NamedTuple):
     """
     The first half of an even grid in blocks.
 
     Attributes
     ----------
     size
-        Of a block.
+        Times in a block.
     places
         Distances from its first time within a block, distances of the blocks' first times from
         the start, distances of their last ones from the end, shape (size + 2 blocks,).
@@ -351,12 +360,12 @@ class EvenPlaces(NamedTuple):
     x: FloatArray
 
 
-@lru_cache(maxsize=PLACES_KEPT)
-def even_places(intervals: int) -> EvenPlaces:
-    """Return the places of a grid's first half, the middle included."""
+@lru_cache(maxsize=BLOCKS_KEPT)
+def grid_blocks(intervals: int) -> GridBlocks:
+    """Return the blocks of a grid's first half, the middle included."""
     half = intervals // 2 + 1
     size = min(BLOCK, half)
     first = np.arange(0, half, size)
     index = np.concatenate([np.arange(size), first, intervals - size + 1 - first])
     x = np.arange(-float(intervals), 2.0 * half - intervals, 2.0) / intervals
-    return EvenPlaces(size, index * (2.0 / intervals), x)
+    return GridBlocks(size, index * (2.0 / intervals), x)
