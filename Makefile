@@ -64,6 +64,7 @@ bench: install $(PEERS)  ## speed beside other libraries, and of the nodes; benc
 
 docs: install $(SITE)  ## the documentation as a site, build/docs/index.html
 	$(BIN)/python docs/parameter_tables.py
+	$(BIN)/python docs/wings.py
 	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs $(ARGS)
 	@echo 'open build/docs/index.html'
 

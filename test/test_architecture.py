@@ -16,6 +16,7 @@
 
 import ast
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 import re
 import subprocess
@@ -199,6 +200,17 @@ def test_every_wing_has_its_row():
 def test_wings_import_in_one_direction(name):
     used = {wing(n) for path in (CORE / name).glob('*.py') for n in imports(path)}
     assert used - {name, ''} <= set(WINGS[name].split())
+
+
+def test_the_picture_of_the_wings_is_fresh(monkeypatch):
+    """Run `python docs/wings.py` if this fails."""
+    pytest.importorskip('matplotlib')
+    monkeypatch.syspath_prepend(CHECKOUT / 'docs')
+    wings = import_module('wings')
+    shown = ElementTree.parse(wings.PICTURE).find(
+        './/{http://purl.org/dc/elements/1.1/}description'
+    )
+    assert shown.text == wings.description()
 
 
 @pytest.mark.parametrize('path', SOURCES, ids=module_name)
