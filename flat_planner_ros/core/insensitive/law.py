@@ -135,7 +135,7 @@ def insensitive_motion(
 
 def check_insensitivity(arm: PlanarArm, wanted: Insensitivity) -> None:
     """
-    Solve a problem of this kind, so that it is known to have a solution and libraries are loaded.
+    Solve a problem of this kind, so that it is known to have a solution.
 
     Raises
     ------
@@ -145,8 +145,6 @@ def check_insensitivity(arm: PlanarArm, wanted: Insensitivity) -> None:
         The arm is not flat.
 
     """
-    if wanted.is_bounded:
-        import scipy.optimize  # noqa: F401  What the search takes, a fifth of a second to load.
     period = tau / Oscillator.of(arm).frequency
     _Problem.of(arm, period, wanted).solve(DEFAULT_WEIGHT)
 

@@ -20,7 +20,6 @@ from flat_planner_ros.core.monitor.adoption import (
     ModelTuner,
     ReportedEstimate,
 )
-from flat_planner_ros.core.monitor.assessment import load_libraries
 from flat_planner_ros.core.monitor.identification import (
     ActuatedJoints,
     identify,
@@ -38,7 +37,6 @@ __all__ = [
     'fit_oscillation',
     'identify',
     'Level',
-    'load_libraries',
     'ModelTuner',
     'MonitorSettings',
     'OscillationFit',

@@ -160,13 +160,6 @@ def _rms_effort(
     return sqrt(_integral(squares, grid) / duration) if duration > 0.0 else None
 
 
-def load_libraries() -> None:
-    """Load what the first report needs: half a second's work that no sample should wait for."""
-    import scipy.fft
-    import scipy.integrate
-    import scipy.optimize  # noqa: F401  Loading is the purpose.
-
-
 def _integral(values: FloatArray, grid: FloatArray) -> float:
     """Return the integral of samples that are joined linearly."""
     from scipy.integrate import trapezoid  # here: slow to import, and only needed for a report

@@ -16,18 +16,17 @@
 
 from collections.abc import Sequence
 import sys
-from threading import Thread
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import (
-    load_libraries,
     MonitorSettings,
     PlannedMotion,
     VibrationMonitor,
     VibrationReport,
 )
+from flat_planner_ros.ros.nodes.early_loading import load_early, REPORTING
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
@@ -47,9 +46,6 @@ TICK_PERIOD = 0.1
 
 LATE_TICK = 2.0 * TICK_PERIOD
 """Time between two such looks beyond which the node has not been listening all the time [s]."""
-
-LOADING_DELAY = 0.1
-"""Time from the node's start after which it answers and may load libraries [s]."""
 
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two messages on `/diagnostics` [s]."""
@@ -89,17 +85,7 @@ class MonitorNode(Node):
         self._ticked = stamps.now(steady)
         self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
-        self._loading = self.create_timer(LOADING_DELAY, self._on_loading, clock=steady)
-
-    def _on_loading(self) -> None:
-        """
-        Load what the first report needs, once, before there is anything to report.
-
-        Beside the executor: on a busy machine it takes longer than a whole motion, which would not
-        be seen.
-        """
-        self._loading.cancel()
-        Thread(target=load_libraries).start()
+        load_early(self, REPORTING)
 
     def _now(self) -> float:
         """Return the node's time [s]."""

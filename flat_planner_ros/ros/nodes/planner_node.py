@@ -15,7 +15,6 @@
 """Planner node: goals in, certified flat motions and verdicts out (docs/interfaces.md)."""
 
 from collections.abc import Callable, Sequence
-from importlib import import_module
 import sys
 from time import perf_counter
 from typing import Any
@@ -24,6 +23,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import Goal, PlannerSession
+from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
@@ -31,7 +31,6 @@ from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -40,12 +39,6 @@ from trajectory_msgs.msg import JointTrajectory
 
 WARNING_PERIOD = 5.0
 """Shortest time between two warnings about the same input [s]."""
-
-LIBRARIES = ('scipy.linalg.lapack', 'scipy.optimize')
-"""What planning through via points or in motion loads when it first needs it."""
-
-LOADING_DELAY = 0.001
-"""Time after which the libraries are loaded [s]; in the executor, when the node is ready."""
 
 
 class PlannerNode(Node):
@@ -83,9 +76,7 @@ class PlannerNode(Node):
         commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
         self._watch = GraphWatch(self, commands, [interfaces.JOINT_STATES], is_listening=True)
         self._apply(self._settings)
-        # Now, as nothing moves yet: in motion, half a second more would be too late for a start.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._loading = self.create_timer(LOADING_DELAY, self._load, clock=steady)
+        load_early(self, PLANNING)
 
     def destroy_node(self) -> None:
         """End the stream of efforts with zeros, then the node."""
@@ -110,12 +101,6 @@ class PlannerNode(Node):
         """Plan the next goals with changed parameters."""
         self._session.settings = settings.session
         self._efforts.configure(settings.stream_effort, settings.session.period)
-
-    def _load(self) -> None:
-        """Load, once, what planning can need."""
-        self._loading.cancel()
-        for library in LIBRARIES:
-            import_module(library)
 
     def _on_goal(self, data: bytes) -> None:
         """Answer a goal given as a trajectory."""
