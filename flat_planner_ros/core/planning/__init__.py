@@ -18,6 +18,7 @@ from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
 from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation, TimedPlan
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
+from flat_planner_ros.core.planning.free_conditions import stop_plan, with_via_times
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import (
@@ -29,7 +30,6 @@ from flat_planner_ros.core.planning.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
-from flat_planner_ros.core.planning.stopping import stop_plan
 from flat_planner_ros.core.planning.tradeoff import (
     baselines,
     duration_advice,
@@ -37,7 +37,6 @@ from flat_planner_ros.core.planning.tradeoff import (
     tradeoff_points,
     TradeoffPoint,
 )
-from flat_planner_ros.core.planning.via_times import with_via_times
 
 __all__ = [
     'CONDITIONS',

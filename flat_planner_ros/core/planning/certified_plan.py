@@ -20,8 +20,9 @@ from math import ceil
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, PlanarArm, UncertifiedPlan
-from flat_planner_ros.core.planning.problem import even_times, MotionProblem
 from flat_planner_ros.core.planning.reference_trajectory import (
+    even_times,
+    MotionProblem,
     ReferenceTrajectory,
     RestToRestTrajectory,
 )

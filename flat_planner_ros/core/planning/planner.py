@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Planning: a goal turned into certified motion laws, joint motion and feed-forward effort."""
+"""Planning: a request turned into a certified plan, whatever kind of motion it asks for."""
 
 from dataclasses import replace
 from math import inf
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import (
     FlatModel,
@@ -25,27 +26,29 @@ from flat_planner_ros.core.arm import (
     strict_arithmetic,
     UncertifiedPlan,
 )
-from flat_planner_ros.core.motion_law import optimal_path, Strategy
-from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Plan, PlanSamples
-from flat_planner_ros.core.planning.moving_start import laws_to_rest
-from flat_planner_ros.core.planning.problem import MotionProblem, problem_of
+from flat_planner_ros.core.insensitive import insensitive_motion
+from flat_planner_ros.core.motion_law import (
+    BoundaryConditions,
+    CONDITIONS,
+    ExponentialLaw,
+    extremals,
+    MAX_DERIVATIVE,
+    optimal_path,
+    PathConditions,
+    probes,
+    stationarity_residual,
+    Strategy,
+)
+from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Plan
 from flat_planner_ros.core.planning.reference_trajectory import (
     LawTrajectory,
+    MotionProblem,
+    problem_of,
     ReferenceTrajectory,
     RestToRestTrajectory,
 )
-from flat_planner_ros.core.planning.request import (
-    MotionRequest,
-    planned_at_rest,
-    PlanningOptions,
-    ViaPoint,
-)
-from flat_planner_ros.core.planning.shaped_trajectory import shaped_trajectory
-from flat_planner_ros.core.planning.via_times import path_of
+from flat_planner_ros.core.planning.request import MotionRequest, planned_at_rest, PlanningOptions
 import numpy as np
-
-__all__ = ['MotionRequest', 'Plan', 'plan', 'PlanningOptions', 'PlanSamples', 'ViaPoint']
-
 
 NO_DISTANCE = 1e-100
 """Distance below which a motion rests: its derivatives would leave double precision [rad]."""
@@ -82,92 +85,175 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
     try:
         problem = problem_of(arm, options, request.duration)
         if request.via:
-            return _through_points(request, options, problem)
-        if request.start_jets is not None:
-            return _from_motion(request, options, problem, request.start_jets)
+            found = _through_points(request, options, problem)
+        elif request.start_jets is not None:
+            if options.strategy is Strategy.INSENSITIVE:
+                # It has no law from a start in motion; the problem's cost is the polynomial one.
+                options = replace(options, strategy=Strategy.POLYNOMIAL)
+            found = _from_motion(request, problem, request.start_jets)
+        else:
+            found = _from_rest(request, options, problem)
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE) from error
-    return _from_rest(request, options, problem)
+    return Plan(
+        request=request,
+        options=options,
+        problem=problem,
+        trajectory=found.trajectory,
+        boundary_residual=found.boundary_residual,
+        optimality_residual=found.optimality_residual,
+    )
 
 
-def _from_rest(request: MotionRequest, options: PlanningOptions, problem: MotionProblem) -> Plan:
-    """Return a plan whose planned variables are multiples of the unit motion."""
+class _Certified(NamedTuple):
+    """A trajectory and its residuals, as a plan states them."""
+
+    trajectory: ReferenceTrajectory
+    boundary_residual: float
+    optimality_residual: float
+
+
+def _from_rest(
+    request: MotionRequest, options: PlanningOptions, problem: MotionProblem
+) -> _Certified:
+    """Return the trajectory whose planned variables are multiples of the unit motion."""
     start, final = planned_at_rest(request.start), planned_at_rest(request.final)
     distances = tuple(
         [0.0 if abs(b - a) < NO_DISTANCE else b - a for a, b in zip(start, final, strict=True)]
     )
     if not all(abs(distance) < problem.reach for distance in distances):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
-    trajectory: ReferenceTrajectory = RestToRestTrajectory(
+    if options.strategy is Strategy.INSENSITIVE and distances[0]:
+        return _insensitive(options, problem, start, final)
+    trajectory = RestToRestTrajectory(
         problem=problem, start=start, final=final, distances=distances
     )
-    moves = any(distances)
-    boundary = problem.unit.boundary_residual if moves else 0.0
-    optimality = problem.unit.optimality_residual if moves else 0.0
-    if options.strategy is Strategy.INSENSITIVE and distances[0]:
-        if options.flat_model is not FlatModel.EXACT:
-            raise InvalidRequest('strategy insensitive needs flat_model exact')
-        trajectory, boundary, optimality = shaped_trajectory(
-            problem, options.insensitivity, start, final
-        )
-    return Plan(
-        request=request,
-        options=options,
+    if not any(distances):
+        return _Certified(trajectory, 0.0, 0.0)
+    unit = problem.unit
+    return _Certified(trajectory, unit.boundary_residual, unit.optimality_residual)
+
+
+def _insensitive(
+    options: PlanningOptions,
+    problem: MotionProblem,
+    start: tuple[float, ...],
+    final: tuple[float, ...],
+) -> _Certified:
+    """
+    Return the trajectory of an insensitive motion.
+
+    Only joint n-1 can excite or quiet the oscillation, and only the first planned variable tells
+    its effort: the others move by the problem's law, in the same time.
+    """
+    if options.flat_model is not FlatModel.EXACT:
+        raise InvalidRequest('strategy insensitive needs flat_model exact')
+    distance = final[0] - start[0]
+    shaped = insensitive_motion(problem.arm, problem.duration, options.insensitivity, distance)
+    others = (
+        problem.unit.law_over(problem.duration, end - begin, 0.5 * (begin + end))
+        for begin, end in zip(start[1:], final[1:], strict=True)
+    )
+    trajectory = LawTrajectory(
         problem=problem,
-        trajectory=trajectory,
-        boundary_residual=boundary,
-        optimality_residual=optimality,
+        laws=(shaped.law.transformed(distance, 0.5 * (start[0] + final[0])), *others),
+        start=_rest(start),
+        final=np.array(final),
+        edges=(0.0, problem.duration),
+        own_cost=shaped.cost,
+    )
+    unit = problem.unit
+    return _Certified(
+        trajectory,
+        max(unit.boundary_residual, shaped.boundary_residual),
+        max(unit.optimality_residual, shaped.stationarity),
     )
 
 
-def _from_motion(
-    request: MotionRequest, options: PlanningOptions, problem: MotionProblem, start: FloatArray
-) -> Plan:
-    """Return a plan whose planned variables have given derivatives at the start."""
-    if options.strategy is Strategy.INSENSITIVE:
-        # It has no law from a start in motion; the problem's cost is the polynomial one.
-        options = replace(options, strategy=Strategy.POLYNOMIAL)
+def _from_motion(request: MotionRequest, problem: MotionProblem, start: FloatArray) -> _Certified:
+    """Return the trajectory whose planned variables have given derivatives at the start."""
     final = np.array(planned_at_rest(request.final))
+    # Counted from the end, so that a distant place costs no digits of a short way.
+    ways = start.copy()
+    ways[:, 0] -= final
+    rest = np.zeros(CONDITIONS)
+    conditions = [BoundaryConditions(start=way, end=rest) for way in ways]
     with strict_arithmetic():
-        found = laws_to_rest(problem, start, final)
-    return Plan(
-        request=request,
-        options=options,
+        laws = extremals(problem.cost.characteristic(), problem.duration, conditions)
+        pairs = zip(laws, ways, strict=True)
+        residuals = [_residuals(problem, law, way) for law, way in pairs if way.any()]
+        places = zip(laws, final.tolist(), strict=True)
+        shifted = tuple(law.transformed(1.0, place) for law, place in places)
+    boundary, optimality = np.max([(0.0, 0.0), *residuals], axis=0).tolist()
+    trajectory = LawTrajectory(
         problem=problem,
-        trajectory=LawTrajectory(
-            problem=problem,
-            laws=found.laws,
-            start=start,
-            final=final,
-            edges=(0.0, problem.duration),
-        ),
-        boundary_residual=found.boundary_residual,
-        optimality_residual=found.optimality_residual,
+        laws=shifted,
+        start=start,
+        final=final,
+        edges=(0.0, problem.duration),
     )
+    return _Certified(trajectory, boundary, optimality)
+
+
+def _residuals(
+    problem: MotionProblem, law: ExponentialLaw, way: FloatArray
+) -> tuple[float, float]:
+    """Return boundary and Euler-Lagrange residual of a law from given derivatives to zero."""
+    powers = (0.5 * problem.duration) ** np.arange(CONDITIONS + 1.0)
+    near = probes()[0, :-1]
+    after_start = np.concatenate([[0.0], near, 2.0 - near[::-1], [2.0]])
+    jet = law.normalised_jet(np.array([after_start, after_start[::-1]]), 2 * CONDITIONS)
+    peaks = np.abs(jet[: CONDITIONS + 1]).max(axis=1)
+    if not (peaks / powers).max() < MAX_DERIVATIVE:
+        raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
+    miss = np.maximum(
+        np.abs(jet[:CONDITIONS, 0] - way * powers[:CONDITIONS]), np.abs(jet[:CONDITIONS, -1])
+    )
+    normalised = problem.cost.characteristic() * powers[::-1] ** 2
+    boundary = float((miss / peaks[:CONDITIONS]).max())
+    return boundary, stationarity_residual(normalised, jet)
 
 
 def _through_points(
     request: MotionRequest, options: PlanningOptions, problem: MotionProblem
-) -> Plan:
-    """Return a plan whose flat outputs pass given values on the way."""
+) -> _Certified:
+    """Return the trajectory whose flat outputs pass given values on the way."""
     if options.strategy is Strategy.INSENSITIVE:
         raise InvalidRequest('strategy insensitive has no via points; another strategy has')
     path = path_of(request, problem)
     found = optimal_path(problem.cost, path)
-    return Plan(
-        request=request,
-        options=options,
+    trajectory = LawTrajectory(
         problem=problem,
-        trajectory=LawTrajectory(
-            problem=problem,
-            laws=found.laws,
-            start=path.start,
-            final=path.values[:, -1],
-            edges=tuple(path.edges.tolist()),
-        ),
-        boundary_residual=found.boundary_residual,
-        optimality_residual=found.optimality_residual,
+        laws=found.laws,
+        start=path.start,
+        final=path.values[:, -1],
+        edges=tuple(path.edges.tolist()),
     )
+    return _Certified(trajectory, found.boundary_residual, found.optimality_residual)
+
+
+def path_of(request: MotionRequest, problem: MotionProblem) -> PathConditions:
+    """Return what the planned variables of a motion go through."""
+    final = np.array(planned_at_rest(request.final))
+    start = request.start_jets
+    if start is None:
+        start = _rest(planned_at_rest(request.start))
+    relaxations = np.zeros(len(final))
+    # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
+    relaxations[0] = problem.flat_map.relaxation
+    return PathConditions(
+        edges=np.array([0.0, *(point.time for point in request.via), request.duration]),
+        start=start,
+        values=np.column_stack([*(point.values for point in request.via), final]),
+        relaxations=relaxations,
+    )
+
+
+def _rest(values: tuple[float, ...]) -> FloatArray:
+    """Return the derivatives 0 to 5 of planned variables at rest, shape (n - 1, 6)."""
+    jets = np.zeros((len(values), CONDITIONS))
+    jets[:, 0] = values
+    return jets
 
 
 def _check_fit(request: MotionRequest, arm: PlanarArm) -> None:

@@ -13,27 +13,186 @@
 # limitations under the License.
 
 """
-Reference trajectory of a motion: the planned variables over time, however their laws were found.
+Reference trajectories: the planned variables over time, however their laws were found.
 
-From rest to rest all planned variables are multiples of one unit motion, which is cached with its
-samples; any other trajectory is evaluated law by law.
+From rest to rest all planned variables are multiples of one unit motion, which is solved once for
+an arm, a cost and a duration, and kept with its samples; any other trajectory is evaluated law by
+law.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple, Protocol
+from functools import cached_property, lru_cache
+from typing import Protocol
 
-from flat_planner_ros.core.arm import apply_row, FloatArray
-from flat_planner_ros.core.motion_law import CONDITIONS, JET_ORDER, Law, motion_quadrature
-from flat_planner_ros.core.planning.problem import even_times, MotionProblem
+from flat_planner_ros.core.arm import (
+    apply_row,
+    flat_map,
+    FlatMap,
+    FloatArray,
+    PlanarArm,
+    strict_arithmetic,
+)
+from flat_planner_ros.core.motion_law import (
+    CONDITIONS,
+    JET_ORDER,
+    Law,
+    motion_quadrature,
+    QuadraticCost,
+    strategy_cost,
+    unit_motion,
+    UnitMotion,
+)
+from flat_planner_ros.core.planning.request import PlanningOptions
 import numpy as np
 
+MAX_NUMBER = 1e300
+"""Largest number in a plan; products with weights of order one still have room."""
 
-class Samples(NamedTuple):
-    """Derivatives 0 to 6 of the planned variables, (n - 1, 7, m); driving effort (m,) [N m]."""
+PROBLEMS_KEPT = 64
+"""Combinations of arm, options and duration whose unit motion is remembered."""
 
-    planned: FloatArray
-    driving_effort: FloatArray
+GRIDS_KEPT = 32
+"""Sampled unit motions in the cache."""
+
+MAX_KEPT_INTERVALS = 10_000
+"""Longest grid that is kept; with `GRIDS_KEPT` it bounds the caches to 24 MB."""
+
+_ORDERS = np.arange(JET_ORDER + 1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotionProblem:
+    """
+    What a plan is made from, besides its ends: the motion over 1 rad.
+
+    Attributes
+    ----------
+    arm
+        What moves.
+    duration
+        Length of the motion [s].
+    cost
+        What is minimised.
+    flat_map
+        From the planned variable to the joints.
+    unit
+        The law in normalised time.
+    rates
+        Factors of its derivatives 0 to 6 in physical time, shape (7,) [1/s^k].
+    cost_value
+        Cost of 1 rad.
+    reach
+        Distance from which numbers overflow [rad].
+
+    """
+
+    arm: PlanarArm
+    duration: float
+    cost: QuadraticCost
+    flat_map: FlatMap
+    unit: UnitMotion
+    rates: FloatArray
+    cost_value: float
+    reach: float
+
+    @cached_property
+    def rows(self) -> FloatArray:
+        """Torque and velocities of the last two joints from the unit motion's jet, (3, 7)."""
+        mapping = self.flat_map
+        rows = np.zeros((3, JET_ORDER + 1))
+        rows[0, : len(mapping.effort)] = mapping.effort
+        rows[1, 1 : len(mapping.output) + 1] = mapping.output
+        rows[2, 1 : len(mapping.deflection) + 1] = mapping.deflection
+        rows[1] -= rows[2]
+        rows *= self.rates
+        return rows
+
+    def grid(self, intervals: int) -> FloatArray:
+        """Return derivatives 0 to 6 and driving effort at even times, read-only, shape (8, m)."""
+        return (_grid if intervals > MAX_KEPT_INTERVALS else _kept_grid)(self, intervals)
+
+    def fill_grid(self, table: FloatArray, distance: float) -> None:
+        """Write derivatives 0 to 6 and driving effort over a distance at even times, (8, m)."""
+        intervals = table.shape[1] - 1
+        if intervals <= MAX_KEPT_INTERVALS:
+            np.multiply(_kept_grid(self, intervals), distance, out=table)
+        else:
+            _fill(self, table, distance)
+
+
+@lru_cache(maxsize=PROBLEMS_KEPT)
+def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> MotionProblem:
+    """
+    Return what plans of an arm have in common; arms and options count as equal if identical.
+
+    Raises
+    ------
+    ArithmeticError
+        The numbers leave double precision.
+    FlatPlannerError
+        The arm, the weights or the equation allow no plan.
+
+    """
+    mapping = flat_map(arm, options.flat_model)
+    cost = strategy_cost(
+        options.strategy, mapping, r=options.r, p=options.p, custom=options.custom
+    )
+    half = 0.5 * float(duration)
+    powers = half**_ORDERS
+    with strict_arithmetic():
+        unit = unit_motion(cost.characteristic() * powers[::-1] ** 2)
+        rates = 1.0 / powers
+        largest = float((rates * unit.peaks).max())
+    # (35) with every derivative in units of the half duration.
+    cost_value = unit.costate * half ** (1.0 - 2.0 * CONDITIONS)
+    # A law that is no minimum, which its certificate refuses, might have a negative cost.
+    # Roots first: a cost of less than 1e-8 would take the quotient out of range.
+    reach = min(MAX_NUMBER / largest, MAX_NUMBER**0.5 / cost_value**0.5) if cost_value > 0 else 0.0
+    return MotionProblem(
+        arm=arm,
+        duration=duration,
+        cost=cost,
+        flat_map=mapping,
+        unit=unit,
+        rates=rates,
+        cost_value=cost_value,
+        reach=reach,
+    )
+
+
+def _grid(problem: MotionProblem, intervals: int) -> FloatArray:
+    """Return the motion over 1 rad at even times."""
+    table = np.empty((len(problem.rates) + 1, intervals + 1))
+    _fill(problem, table, 1.0)
+    table.setflags(write=False)
+    return table
+
+
+def _fill(problem: MotionProblem, table: FloatArray, distance: float) -> None:
+    """Write the motion over a distance at even times."""
+    problem.unit.fill_grid(table[:-1], distance * problem.rates)
+    row = problem.flat_map.effort
+    np.matmul(row, table[: len(row)], out=table[-1])
+
+
+_kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
+
+
+def even_times(duration: float, intervals: int) -> FloatArray:
+    """Return even times of a motion, both ends exact, read-only, shape (m,) [s]."""
+    return (_times if intervals > MAX_KEPT_INTERVALS else _kept_times)(duration, intervals)
+
+
+def _times(duration: float, intervals: int) -> FloatArray:
+    """Return even times of a motion."""
+    times = np.arange(intervals + 1.0)
+    times /= intervals
+    times *= duration
+    times.setflags(write=False)
+    return times
+
+
+_kept_times = lru_cache(maxsize=GRIDS_KEPT)(_times)
 
 
 class ReferenceTrajectory(Protocol):
@@ -54,8 +213,8 @@ class ReferenceTrajectory(Protocol):
     def jets(self, times: FloatArray) -> FloatArray:
         """Return the derivatives 0 to 6 at times clipped to the motion, shape (n - 1, 7, m)."""
 
-    def on_even_grid(self, intervals: int) -> Samples:
-        """Return derivatives and driving effort at intervals + 1 even times."""
+    def on_even_grid(self, intervals: int) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives 0 to 6, (n - 1, 7, m), and driving effort, (m,), at even times."""
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
@@ -85,9 +244,10 @@ class RestToRestTrajectory:
     @cached_property
     def laws(self) -> tuple[Law, ...]:
         """Return the law of each planned variable."""
+        ends = zip(self.distances, self.start, self.final, strict=True)
         return tuple(
             self.problem.unit.law_over(self.problem.duration, distance, 0.5 * (start + final))
-            for distance, start, final in zip(self.distances, self.start, self.final, strict=True)
+            for distance, start, final in ends
         )
 
     @property
@@ -114,8 +274,8 @@ class RestToRestTrajectory:
             planned[:, 0, reached] = np.array(end)[:, None]
         return planned
 
-    def on_even_grid(self, intervals: int) -> Samples:
-        """Return derivatives and driving effort at intervals + 1 even times."""
+    def on_even_grid(self, intervals: int) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives 0 to 6, (n - 1, 7, m), and driving effort, (m,), at even times."""
         problem, distances = self.problem, self.distances
         table = np.empty((len(distances), len(problem.rates) + 1, intervals + 1))
         unit = problem.grid(intervals) if len(distances) > 1 else None
@@ -128,7 +288,7 @@ class RestToRestTrajectory:
             values = part[0]
             values += 0.5 * (start + final)
             values[0], values[-1] = start, final
-        return Samples(table[:, :-1], table[0, -1])
+        return table[:, :-1], table[0, -1]
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
@@ -187,10 +347,10 @@ class LawTrajectory:
             planned[:, :CONDITIONS, reached] = end[..., None]
         return planned
 
-    def on_even_grid(self, intervals: int) -> Samples:
-        """Return derivatives and driving effort at intervals + 1 even times."""
+    def on_even_grid(self, intervals: int) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives 0 to 6, (n - 1, 7, m), and driving effort, (m,), at even times."""
         planned = self.jets(even_times(self.problem.duration, intervals))
-        return Samples(planned, apply_row(self.problem.flat_map.effort, planned[0]))
+        return planned, apply_row(self.problem.flat_map.effort, planned[0])
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""

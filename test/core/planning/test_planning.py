@@ -25,7 +25,7 @@ from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremal
 from flat_planner_ros.core.planning import certified_plan
 from flat_planner_ros.core.planning.planner import plan
-from flat_planner_ros.core.planning.problem import problem_of
+from flat_planner_ros.core.planning.reference_trajectory import problem_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.rollout import rollout

@@ -20,7 +20,7 @@ from core.conftest import ELBOW
 from flat_planner_ros.core.arm.errors import UncertifiedPlan
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions
-from flat_planner_ros.core.planning import certified_plan, moving_start
+from flat_planner_ros.core.planning import certified_plan, planner
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
@@ -177,7 +177,7 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, arm, constant, q
 
 @pytest.mark.parametrize('damage', ['boundary', 'optimality'])
 def test_certificates_see_a_law_that_is_wrong(monkeypatch, arm, damage):
-    compute = moving_start.extremals
+    compute = planner.extremals
 
     def wrong(coefficients, duration, jets):
         if damage == 'optimality':
@@ -185,7 +185,7 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, arm, damage):
         near = [BoundaryConditions(start=ends.start * (1.0 + 1e-8), end=ends.end) for ends in jets]
         return compute(coefficients, duration, near)
 
-    monkeypatch.setattr(moving_start, 'extremals', wrong)
+    monkeypatch.setattr(planner, 'extremals', wrong)
     with pytest.raises(UncertifiedPlan, match=damage):
         plan(request_from(random_jets(8)), arm, STRATEGIES['energy'])
 

@@ -13,11 +13,15 @@
 # limitations under the License.
 
 """
-Times of via points that have none: those at which the optimal path is cheapest.
+What a request may leave open, chosen where the cost is least.
 
-The path itself is solved exactly for any times, and its cost has a derivative with respect to each
-of them ((V8) of docs/derivation.md). So the times are refined by a quasi-Newton method on the same
-cost that the strategy minimises, the duration kept.
+Times of via points: the path itself is solved exactly for any times, and its cost has a
+derivative with respect to each of them ((V8) of docs/derivation.md); they are refined by a
+quasi-Newton method on the same cost that the strategy minimises, the duration kept.
+
+Final pose of a stop: where the cost is least, the costate that belongs to the value of each
+planned variable is zero at the end ((S2)); it is linear in the final value, so that two laws tell
+where that is.
 """
 
 from dataclasses import replace
@@ -27,17 +31,16 @@ from math import inf
 from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedPlan
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
+    costate,
     optimal_path,
     PathConditions,
     QuadraticCost,
 )
-from flat_planner_ros.core.planning.problem import MotionProblem, problem_of
-from flat_planner_ros.core.planning.request import (
-    MotionRequest,
-    planned_at_rest,
-    PlanningOptions,
-    ViaPoint,
-)
+from flat_planner_ros.core.planning.certified_plan import Plan
+from flat_planner_ros.core.planning.limits import JointLimits
+from flat_planner_ros.core.planning.planner import path_of, plan
+from flat_planner_ros.core.planning.reference_trajectory import problem_of
+from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions, ViaPoint
 import numpy as np
 
 LEAST_SHARE = 0.05
@@ -52,6 +55,21 @@ GRADIENT_TOLERANCE = 1e-3
 
 MAX_ITERATIONS = 40
 """Bound on the quasi-Newton steps; the cost has long settled then."""
+
+SHORTEST = 1.0 / 16.0
+"""Shortest stop that is considered, in terms of the rest of the motion [-]."""
+
+HALVINGS = 6
+"""Halvings of the range of durations, in logarithm: finds the stop within 5 %."""
+
+DEMAND = 2.0
+"""Peaks that a stop may reach, in terms of those of the motion that it ends [-]."""
+
+REST_DURATION = 0.1
+"""Longest stop of an arm that does not move yet [s]."""
+
+PROBE = 1.0
+"""Distance between the two final values that are tried [rad]."""
 
 
 def allocate_times(cost: QuadraticCost, path: PathConditions) -> FloatArray:
@@ -97,24 +115,6 @@ def allocate_times(cost: QuadraticCost, path: PathConditions) -> FloatArray:
         options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
     )
     return _edges(found.x, duration)
-
-
-def path_of(request: MotionRequest, problem: MotionProblem) -> PathConditions:
-    """Return what the planned variables of a motion go through."""
-    final = np.array(planned_at_rest(request.final))
-    start = request.start_jets
-    if start is None:
-        start = np.zeros((len(final), CONDITIONS))
-        start[:, 0] = planned_at_rest(request.start)
-    relaxations = np.zeros(len(final))
-    # Of the flat outputs, y1 alone may differ from its planned variable ((15a)).
-    relaxations[0] = problem.flat_map.relaxation
-    return PathConditions(
-        edges=np.array([0.0, *(point.time for point in request.via), request.duration]),
-        start=start,
-        values=np.column_stack([*(point.values for point in request.via), final]),
-        relaxations=relaxations,
-    )
 
 
 def with_via_times(
@@ -181,3 +181,102 @@ def _log_cost(
     by_logarithm = shares * (by_length - shares @ by_length)
     scale = duration * (1.0 - LEAST_SHARE) / found.cost_value
     return float(np.log(found.cost_value)), scale * by_logarithm
+
+
+def stop_plan(
+    running: Plan,
+    pose: FloatArray,
+    jets: FloatArray | None,
+    remaining: float,
+    limits: JointLimits | None = None,
+) -> Plan:
+    """
+    Return the shortest plan to rest that demands little more than the motion that it ends.
+
+    Its peaks of effort and velocity stay below twice the motion's: with the same effort, a motion
+    that is optimal cannot be stopped much before its end. Where no stop keeps within the limits,
+    which may have been lowered since, it takes all the time that the motion would have taken.
+
+    Parameters
+    ----------
+    running
+        The plan that is being carried out, whose model and cost are kept.
+    pose
+        Angles of all joints at the start of the stop, shape (n,) [rad].
+    jets
+        Derivatives 0 to 5 of the planned variables there, shape (n - 1, 6) [rad/s^k]; None when
+        the arm has not begun to move.
+    remaining
+        Time that the motion would still take [s], the longest stop.
+    limits
+        Of the joints, if there are any.
+
+    """
+    arm, options = running.problem.arm, running.options
+    if jets is None:
+        request = MotionRequest(start=pose, final=pose, duration=min(remaining, REST_DURATION))
+        return plan(request, arm, options)
+    effort = DEMAND * running.peak_effort
+    velocity = DEMAND * running.peak_velocity
+    best = _stop(running, options, pose, jets, remaining)
+    shortest, longest = SHORTEST * remaining, remaining
+    for _ in range(HALVINGS):
+        middle = (shortest * longest) ** 0.5
+        try:
+            tried = _stop(running, options, pose, jets, middle)
+        except UncertifiedPlan:
+            shortest = middle
+            continue
+        demanding = (tried.peak_effort > effort).any() or (tried.peak_velocity > velocity).any()
+        if demanding or _exceeds(tried, limits):
+            shortest = middle
+        else:
+            best, longest = tried, middle
+    return best
+
+
+def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
+    """Tell whether a stop goes beyond a limit."""
+    use = None if limits is None else limits.worst(tried)
+    return use is not None and use.exceeded
+
+
+def _stop(
+    running: Plan,
+    options: PlanningOptions,
+    pose: FloatArray,
+    jets: FloatArray,
+    duration: float,
+) -> Plan:
+    """Return the plan to rest of a given duration that costs least."""
+    arm = running.problem.arm
+    first, second = (
+        plan(
+            MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets),
+            arm,
+            options,
+        )
+        for values in (jets[:, 0], jets[:, 0] + PROBE)
+    )
+    low, high = _end_costates(first), _end_costates(second)
+    values = jets[:, 0] + PROBE * low / (low - high)
+    request = MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets)
+    return plan(request, arm, options)
+
+
+def _end_costates(planned: Plan) -> FloatArray:
+    """Return the costate of each planned variable at the end, shape (n - 1,)."""
+    coefficients = planned.problem.cost.characteristic()
+    end = np.array([planned.duration])
+    return np.array(
+        [
+            costate(coefficients, law.jet(end, 2 * CONDITIONS - 1))[0]
+            for law in planned.trajectory.laws
+        ]
+    )
+
+
+def _pose(values: FloatArray) -> FloatArray:
+    """Return the joint angles at rest of given planned variables, the elastic joint relaxed."""
+    inner = values[1:]
+    return np.array([*inner, values[0] - inner.sum(), 0.0])
