@@ -12,74 +12,76 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Directive `api-reference`: the public list of the core, module by module."""
+"""Directives `api-names` and `api-wing`: documentation of names on the public lists of the core."""
 
 from importlib import import_module
 import inspect
+from types import GenericAlias
 
 from docutils import nodes
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
-from sphinx.util.nodes import nested_parse_with_titles
 
 CORE = 'flat_planner_ros.core'
 
 
-def modules() -> dict[str, list[str]]:
-    """Return the public names of the core by the modules that define them."""
-    core = import_module(CORE)
-    found: dict[str, list[str]] = {}
-    for name in core.__all__:
-        value = getattr(core, name)
-        is_defined = inspect.isclass(value) or inspect.isfunction(value)
-        home = value.__module__ if is_defined else _home_of_constant(name)
-        found.setdefault(home, []).append(name)
-    return dict(sorted(found.items()))
+def entry(module: str, name: str) -> list[str]:
+    """Return the lines that document a name of a public list."""
+    value = getattr(import_module(module), name)
+    if inspect.isclass(value):
+        fields = ','.join(getattr(value, '_fields', ()))
+        kind, options = 'autoclass', ['   :members:', f'   :exclude-members: {fields}']
+    elif inspect.isfunction(value):
+        kind, options = 'autofunction', []
+    elif isinstance(value, GenericAlias):
+        return []  # a name for a type, of which there is no more to say than its value
+    else:
+        kind, options = 'autodata', ['   :no-value:']
+    return [f'.. {kind}:: {module}.{name}', *options, '']
 
 
-def _home_of_constant(name: str) -> str:
-    """Return the module that assigns a constant."""
-    core = import_module(CORE)
-    for home, module in inspect.getmembers(core, inspect.ismodule):
-        if name in vars(module) and f'{name} =' in inspect.getsource(module):
-            return f'{CORE}.{home}'
-    return CORE
+class ApiNames(SphinxDirective):
+    """Names of the front door, in the order in which they are written."""
 
-
-class ApiReference(SphinxDirective):
-    """One section for each module: what it says of itself, then its public names."""
+    has_content = True
 
     def run(self) -> list[nodes.Node]:
-        """Return the sections."""
-        lines: list[str] = []
-        for home, names in modules().items():
-            title = home.removeprefix(f'{CORE}.')
-            lines += [
-                title,
-                '-' * len(title),
-                '',
-                f'.. automodule:: {home}',
-                '   :no-members:',
-                '',
-            ]
-            for name in names:
-                value = getattr(import_module(CORE), name)
-                kind = 'autodata'
-                options = ['   :no-value:']
-                if inspect.isclass(value):
-                    fields = ','.join(getattr(value, '_fields', ()))
-                    kind, options = 'autoclass', ['   :members:', f'   :exclude-members: {fields}']
-                elif callable(value):
-                    kind, options = 'autofunction', []
-                lines += [f'.. {kind}:: {home}.{name}', *options, '']
-        section = nodes.section()
-        section.document = self.state.document
-        nested_parse_with_titles(self.state, StringList(lines, 'api'), section)
-        return section.children
+        """Return their documentation."""
+        lines = [line for name in ' '.join(self.content).split() for line in entry(CORE, name)]
+        return self.parse_content_to_nodes_of(lines)
+
+    def parse_content_to_nodes_of(self, lines: list[str]) -> list[nodes.Node]:
+        """Return what lines of reStructuredText become."""
+        container = nodes.section()
+        container.document = self.state.document
+        self.state.nested_parse(StringList(lines, 'api'), 0, container)
+        return container.children
+
+
+class ApiWing(ApiNames):
+    """All public names of a wing that the front door does not have."""
+
+    has_content = False
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Return what the wing says of itself, and the documentation of its names."""
+        home = f'{CORE}.{self.arguments[0]}'
+        wing, front = import_module(home), import_module(CORE)
+        at_the_door = [name for name in wing.__all__ if name in front.__all__]
+        lines = [(inspect.getdoc(wing) or '').partition(': ')[2], '']
+        if at_the_door:
+            names = ', '.join(f'``{name}``' for name in at_the_door)
+            lines += [f'At the :doc:`front door <index>`: {names}.', '']
+        for name in wing.__all__:
+            if name not in front.__all__:
+                lines += entry(home, name)
+        return self.parse_content_to_nodes_of(lines)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the directive."""
-    app.add_directive('api-reference', ApiReference)
+    """Register the directives."""
+    app.add_directive('api-names', ApiNames)
+    app.add_directive('api-wing', ApiWing)
     return {'parallel_read_safe': True}

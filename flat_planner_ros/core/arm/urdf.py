@@ -58,7 +58,17 @@ PLUGINS: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class UrdfLimits:
-    """Bounds of one joint, infinite where there are none [rad], [rad/s], [N m]."""
+    """
+    Bounds of one joint, infinite where there are none.
+
+    Attributes
+    ----------
+    lower, upper
+        Of the angle [rad].
+    velocity, effort
+        Of the magnitude [rad/s], [N m].
+
+    """
 
     lower: float = -inf
     upper: float = inf

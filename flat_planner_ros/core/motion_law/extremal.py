@@ -153,7 +153,7 @@ def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
     Returns
     -------
     float
-        Largest |sum_k a_k y^(2k)| over the times, relative to the largest sum of the terms'
+        Largest ``|sum_k a_k y^(2k)|`` over the times, relative to the largest sum of the terms'
         magnitudes [-].
 
     """
