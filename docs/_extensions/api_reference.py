@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Directives `api-names` and `api-wing`: documentation of names on the public lists of the core."""
+"""Directives `api-names` and `api-wing`: what is on the public lists of the core, documented."""
 
 from importlib import import_module
 import inspect
