@@ -28,7 +28,7 @@ from typing import Any
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.programs import SIGNALS
 import rclpy
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NotInitializedException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
 from rclpy.node import Node
@@ -101,8 +101,14 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
         except ExternalShutdownException:
             pass
         # RuntimeError is what rcl raises for arguments and parameter files it cannot read, and for
-        # whatever is attempted in a context that has been shut down.
-        except (FlatPlannerError, ParameterException, RuntimeError) as error:
+        # whatever is attempted in a context that has been shut down; for a node that is made then,
+        # it is NotInitializedException.
+        except (
+            FlatPlannerError,
+            ParameterException,
+            NotInitializedException,
+            RuntimeError,
+        ) as error:
             if not is_open or rclpy.ok():
                 if is_ready:
                     raise

@@ -22,7 +22,17 @@ from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from ros.relay import Faults, Relay
-from ros.world import answers, EVERY_VERDICT, goal, move, Observer, stamp, STATUS, values
+from ros.world import (
+    answers,
+    EVERY_VERDICT,
+    goal,
+    move,
+    not_verified,
+    Observer,
+    stamp,
+    STATUS,
+    values,
+)
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -93,6 +103,7 @@ def played(command, times):
 def assert_honest(report, angles):
     """Compare a reported amplitude with the largest deflection that was really there."""
     amplitude, peak = float(values(report)['amplitude']), np.abs(angles).max()
+    assert np.isfinite(amplitude)
     if max(amplitude, peak) > 2e-5:
         # A tenth of it decays until the peak, which need not be the first one either.
         assert 0.95 * peak < amplitude < 1.3 * peak
@@ -115,12 +126,14 @@ def test_every_goal_that_arrives_gets_one_verdict_in_the_order_of_arrival(graph)
     assert len(set(arrived)) < len(arrived), 'some came twice'
     assert set(arrived) < set(sent), 'some were lost'
     assert arrived != sorted(arrived), 'some came out of order'
-    graph.expect(lambda: len(answers(lossy.status)) >= len(arrived), 'all verdicts')
-    graph.spin_until(lambda: False, 0.3)  # no verdict too many
-    answered = [json.loads(v['goal.positions'])[0] for v in answers(lossy.status)]
-    assert answered == pytest.approx(arrived)
-    for message, verdict in zip(relay.delivered, answers(lossy.status), strict=True):
-        assert (verdict['state'] == 'REJECTED') >= bool(message.points[0].velocities)
+    graph.publish('/goals', JointTrajectory())  # its verdict is the last one
+    graph.expect(lambda: len(answers(lossy.status)) > len(arrived), 'all verdicts')
+    *verdicts, last = answers(lossy.status)
+    assert last['error_name'] == 'EMPTY_GOAL'
+    assert [json.loads(v['goal.positions'])[0] for v in verdicts] == pytest.approx(arrived)
+    moving = [v for m, v in zip(relay.delivered, verdicts, strict=False) if m.points[0].velocities]
+    assert moving
+    assert {verdict['state'] for verdict in moving} == {'REJECTED'}
 
 
 def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
@@ -134,10 +147,10 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
         start_tolerance=0.002,
     )
     kinds = []
-    for number in range(8):
+    while len(kinds) < 8 or ('whole' not in kinds and len(kinds) < 20):
         graph.call(Trigger, '/flat_plant/reset')
         lossy.wait_until(stamp(lossy.states[-1]) + 0.1)  # the planner has heard of it
-        lossy.relay.faults = Faults(loss=0.2, duplication=0.5, delay=DELAYS[number % 3])
+        lossy.relay.faults = Faults(loss=0.2, duplication=0.5, delay=DELAYS[len(kinds) % 3])
         del lossy.reports[:], lossy.relay.delivered[:], lossy.relay.received[:]
         refusals, delays = (len(graph.logged(text)) for text in (REFUSED, LATE))
         verdict = lossy.send(pi)
@@ -160,6 +173,8 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
         if kinds[-1] == 'whole':
             assert np.abs(angles).max() < 1e-5
     assert 'not played' in kinds, kinds
+    if 'whole' not in kinds:
+        not_verified(f'none of {len(kinds)} motions was played from its start')
 
 
 def test_a_command_that_was_overtaken_does_not_take_over_again(graph):

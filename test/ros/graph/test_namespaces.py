@@ -14,52 +14,42 @@
 
 """Three arms in namespaces of one graph; and processes that are not to be found beyond a host."""
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros.wire import interfaces
+from collections import Counter
+
 import numpy as np
 import pytest
 from ros.conftest import TIMEOUT
-from ros.world import EVERY_VERDICT, goal, move, stamp, values
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory
+from ros.world import World
 
 ARMS = ('left', 'middle', 'right')
 
 
 def test_three_arms_on_one_graph_do_not_hear_each_other(graph):
-    states, status, commands, reports = {}, {}, {}, {}
-    for arm in ARMS:
-        graph.start('demo', '--ros-args', '-r', f'__ns:=/{arm}')
-        states[arm] = graph.collect(JointState, f'/{arm}/joint_states', matched=False)
-        status[arm] = graph.collect(
-            DiagnosticArray, f'/{arm}/flat_planner/status', EVERY_VERDICT, matched=False
-        )
-        commands[arm] = graph.collect(
-            JointTrajectory, f'/{arm}/flat_planner/joint_trajectory', matched=False
-        )
-        reports[arm] = graph.collect(
-            DiagnosticArray, f'/{arm}/flat_monitor/report', interfaces.LATCHED, matched=False
-        )
-    graph.expect(lambda: all(states.values()), 'joint states of all arms')
+    worlds = [World(graph, namespace=f'/{arm}') for arm in ARMS]
+    graph.expect(lambda: all(world.states for world in worlds), 'joint states of all arms')
+    asked = Counter()
 
-    def accepted(arm):
-        return [v for v in map(values, status[arm]) if v['state'] == 'ACCEPTED']
+    def accepted(world):
+        return [v for v in world.answers() if v['state'] == 'ACCEPTED']
 
-    for count, (arm, position) in enumerate(zip(ARMS, (1.0, -0.5, 0.7), strict=True), 1):
-        verdict = move(graph, status[arm], goal(position, 0.8), f'/{arm}/flat_planner/goal')
-        end = float(verdict['start_time']) + 0.8
-        graph.expect(lambda arm=arm: commands[arm], 'the command')
-        graph.expect(lambda arm=arm, end=end: stamp(states[arm][-1]) > end + 0.1, 'the end')
-        assert len(accepted(arm)) == len(commands[arm]) == 1
-        for other in ARMS[count:]:
-            assert not status[other]
-            assert not commands[other]
-            moved = [(*state.position, *state.effort) for state in states[other]]
-            assert not np.any(moved)
-        if not graph.logged('ms after its start'):
-            assert states[arm][-1].position[0] == pytest.approx(position, abs=1e-3)
-    graph.expect(lambda: all(reports.values()), 'a report of each arm')
-    assert [len(reports[arm]) for arm in ARMS] == [1, 1, 1]
+    for count, (world, position) in enumerate(zip(worlds, (1.0, -0.5, 0.7), strict=True), 1):
+
+        def arrive(world=world, position=position, others=worlds[count:]):
+            """Move one arm; return where it comes to rest."""
+            asked[world] += 1
+            world.move(position, 0.8)
+            world.wait_until(world.end + 0.1)
+            assert len(accepted(world)) == len(world.commands) == asked[world]
+            for other in others:
+                assert not other.status
+                assert not other.commands
+                moved = [(*state.position, *state.effort) for state in other.states]
+                assert not np.any(moved)
+            world.amplitude()  # the report
+            return world.states[-1].position[0]
+
+        assert world.in_time(arrive) == pytest.approx(position, abs=1e-3)
+    assert [len(world.reports) for world in worlds] == [asked[world] for world in worlds]
     assert not graph.logged('is published by')
 
 

@@ -21,20 +21,36 @@ import sys
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 
 CODE = 'import sys; from flat_planner_ros.programs import {0}; sys.exit({0}())'
 """What an installed console script does."""
 
 PROGRAMS = ('planner_node', 'plant_node', 'monitor_node', 'demo')
 
-MOMENTS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 2.0)
-"""From catching signals to the first one [s]: imports, the opening of the graph, spinning."""
+STAGES = {
+    'signals are caught': '',
+    'NumPy is loaded': '_multiarray_umath',
+    'rclpy is loaded': '_rclpy_pybind11',
+    'the middleware is loaded': 'librmw_dds_common',
+    'messages are loaded': 'libsensor_msgs__rosidl_typesupport',
+    'the node is on the graph': None,
+    'it is ready': None,
+}
+"""What a program has come to when it is ended, and the library that shows it."""
 
 SHUTDOWN = """
 import sys, threading
 from flat_planner_ros.ros.nodes.plant_node import main
 import rclpy
-threading.Timer({delay}, rclpy.try_shutdown).start()
+
+def shut_down():
+    if rclpy.ok():  # before there is a context it would do nothing
+        threading.Timer({delay}, rclpy.try_shutdown).start()
+    else:
+        threading.Timer(0.001, shut_down).start()
+
+shut_down()
 sys.exit(main())
 """
 
@@ -66,12 +82,34 @@ def start(graph, name, *arguments):
     return process
 
 
+def signals(pid: int, kind: str) -> int:
+    """Return a set of signals of a process as bits: SigCgt are caught, ShdPnd are on their way."""
+    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+        if line.startswith(f'{kind}:'):
+            return int(line.split()[1], 16)
+    return 0
+
+
 def catches(pid: int, number: int) -> bool:
     """Return whether a process has a handler for a signal."""
-    for line in Path(f'/proc/{pid}/status').read_text().splitlines():
-        if line.startswith('SigCgt:'):
-            return bool(int(line.split()[1], 16) >> (number - 1) & 1)
-    return False
+    return bool(signals(pid, 'SigCgt') >> (number - 1) & 1)
+
+
+def has_loaded(process, library: str) -> bool:
+    """Return whether a process has loaded a library, or has ended."""
+    if process.exit_code is not None:
+        return True
+    return library in Path(f'/proc/{process.pid}/maps').read_text()
+
+
+def await_stage(graph, process, stage: str) -> None:
+    """Wait until a program has come so far."""
+    if STAGES[stage] is not None:
+        graph.expect(lambda: has_loaded(process, STAGES[stage]), stage)
+    elif stage == 'it is ready':
+        graph.expect(lambda: 'ready' in process.stderr, stage)
+    else:
+        graph.expect(lambda: len(graph.probe.get_node_names()) > 1, stage)  # the probe is one
 
 
 def assert_clean(process) -> None:
@@ -83,37 +121,38 @@ def assert_clean(process) -> None:
         os.killpg(process.pid, 0)
 
 
-@pytest.mark.parametrize('moment', MOMENTS)
+@pytest.mark.parametrize('stage', STAGES)
 @pytest.mark.parametrize('name', PROGRAMS)
-def test_a_signal_at_any_moment_ends_a_program(graph, name, moment):
-    index = MOMENTS.index(moment) + PROGRAMS.index(name)
+def test_a_signal_at_any_moment_ends_a_program(graph, name, stage):
+    index = list(STAGES).index(stage) + PROGRAMS.index(name)
     numbers = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGTERM)][index % 3]
     process = start(graph, name)
-    graph.spin_until(lambda: False, moment)
+    await_stage(graph, process, stage)
     for number in numbers:
         if process.exit_code is None:
             os.kill(process.pid, number)
-        graph.spin_until(lambda: False, 0.03 * (index % 2))
+        if index % 2:  # the second one comes when the first one has been taken
+            graph.expect(
+                lambda: process.exit_code is not None or not signals(process.pid, 'ShdPnd'),
+                'a signal taken',
+            )
     assert_clean(process)
 
 
-@pytest.mark.parametrize('seed', range(3))
-def test_a_hail_of_signals_does_no_more_than_one(graph, seed):
-    process = start(graph, PROGRAMS[seed])
-    graph.spin_until(lambda: False, 0.4 * seed)
-    while process.exit_code is None:
-        os.kill(process.pid, signal.SIGINT if seed else signal.SIGTERM)
-        graph.spin_until(lambda: False, 0.005)
+@pytest.mark.parametrize('stage', ['signals are caught', 'rclpy is loaded', 'it is ready'])
+def test_a_hail_of_signals_does_no_more_than_one(graph, stage):
+    index = list(STAGES).index(stage)
+    process = start(graph, PROGRAMS[index % 3])
+    await_stage(graph, process, stage)
+    number = signal.SIGINT if index else signal.SIGTERM
+    while not graph.spin_until(lambda: process.exit_code is not None, 0.005):
+        os.kill(process.pid, number)
     assert_clean(process)
 
 
 @pytest.mark.parametrize('delay', [0.0, 0.03, 0.06, 0.1, 0.15, 1.0])
 def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
     process = graph.run([sys.executable, '-c', SHUTDOWN.format(delay=delay)])
-    if delay < 1.0:  # it may come before there is a context, and then does nothing
-        graph.spin_until(lambda: process.exit_code is not None, 3.0)
-        if process.exit_code is None:
-            process.stop()
     assert_clean(process)
 
 
@@ -127,7 +166,7 @@ def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
 def test_a_tool_that_is_interrupted_ends_with_130_and_no_word(graph, number):
     many = ['--stretch', *map(str, np.linspace(1.0, 3.0, 500))]
     process = start(graph, 'tradeoff', '--final', '3.14', '--duration', '1', *many)
-    graph.spin_until(lambda: False, 0.5)
+    graph.expect(lambda: has_loaded(process, 'scipy'), 'a program at work')
     assert process.stop(number) == 130
     assert process.stderr == ''
 
@@ -144,7 +183,8 @@ def test_a_program_says_that_it_is_ready_once(graph):
     parameters = Path(__file__).resolve().parents[3] / 'config' / 'arm_2dof.yaml'
     process = start(graph, 'plant_node', '--ros-args', '--params-file', str(parameters))
     graph.expect(lambda: '[flat_plant]: ready' in process.stderr, 'a word')
-    graph.spin_until(lambda: False, 0.3)
+    states = graph.collect(JointState, '/joint_states', matched=False)
+    graph.expect(lambda: len(states) > 50, 'a plant that goes on')
     assert process.stop() == 0
     assert len(process.stderr.splitlines()) == 1
 
