@@ -85,3 +85,10 @@ def test_what_the_tutorial_runs_with_ros_exists():
         assert f"'{program} = " in setup
     for name in re.findall(r'ros2 launch flat_planner_ros ([\w.]+)', TEXT):
         assert (CHECKOUT / 'launch' / name).is_file()
+
+
+def test_the_python_of_the_readme_prints_what_it_says():
+    blocks = BLOCK.findall((CHECKOUT / 'README.md').read_text('utf-8'))
+    (python,) = [block for language, block in blocks if language == 'python']
+    (text,) = [block for language, block in blocks if language == 'text']
+    assert run_python(python, {}) == text
