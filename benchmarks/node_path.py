@@ -31,7 +31,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 TARGET = 5e-3
@@ -213,7 +213,7 @@ def _parts_section() -> Section:
     """Measure the steps of the callback one by one."""
     arm, request = problem.arm(), problem.request()
     period = problem.DURATION / (WATCHED - 1)
-    motion, msg = _motion(WATCHED), _goal(pi)
+    motion, data = _motion(WATCHED), serialize_message(_goal(pi))
     timeline = Timeline([motion])
     track = timeline.track(motion.planned_at)
     goal = Goal(
@@ -225,7 +225,7 @@ def _parts_section() -> Section:
         return _motion(WATCHED)
 
     steps: list[tuple[str, Callable[[Any], object], Callable[[], Any]]] = [
-        ('read the goal', lambda _: conversions.goal_from_trajectory(msg), lambda: None),
+        ('read the goal', lambda _: conversions.goal_from_trajectory(data), lambda: None),
         ('plan', lambda _: plan(request, arm, problem.OPTIONS), lambda: None),
         ('sample', lambda _: motion.plan.sample(period), lambda: None),
         ('gather the points', lambda _: timeline.track(motion.planned_at), lambda: None),

@@ -25,7 +25,7 @@ import signal
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""What ends a program."""
+"""Signals that end a program."""
 
 INTERRUPTED = 130
 """Exit code of a tool that was ended before it was done."""

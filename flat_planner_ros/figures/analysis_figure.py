@@ -51,7 +51,7 @@ def draw(
     report, motion
         The verdict and what it is about.
     times
-        Of the samples [s], shape (m,).
+        Times of the samples [s], shape (m,).
     positions, efforts
         Measured [rad], [N m], shape (m, n); NaN where unknown.
     path

@@ -39,9 +39,9 @@ class Scenario(NamedTuple):
     Attributes
     ----------
     number
-        As in the paper, which has three.
+        Number in the paper, which has three.
     title
-        What distinguishes it.
+        Difference from the others in words.
     damping_factor
         Damping known to the planner over the arm's nominal one [-].
     stiffness_scale, damping_scale
@@ -76,9 +76,9 @@ class Method(NamedTuple):
     Attributes
     ----------
     name
-        As the table shows it.
+        Name in the table.
     parameters : Mapping[str, str]
-        Of the planner, fixed ones.
+        Values of the planner's parameters.
     learns
         Whether the row is the second of two motions, after the estimate from the first has been
         adopted.
@@ -97,7 +97,7 @@ def _method(name: str, strategy: str, flat_model: str, learns: bool = False) -> 
 
 
 METHODS = tuple(_method(strategy, strategy, 'approximate') for strategy in STRATEGIES)
-"""Those of the paper."""
+"""The methods of the paper."""
 
 EXACT = _method('exact', 'min_control_effort', 'exact')
 INSENSITIVE = _method('insensitive', 'insensitive', 'exact')
@@ -113,7 +113,7 @@ BEYOND = (
     *((SCENARIOS[2], method) for method in (EXACT, INSENSITIVE, SELF_TUNED)),
     *((SOFTER, method) for method in (*METHODS, EXACT, INSENSITIVE, SELF_TUNED)),
 )
-"""The same with what the paper does not have."""
+"""The rows of the paper's table and those that it does not have."""
 
 PRINTED = {
     (1, 'polynomial'): (0.0074, 0.0),
@@ -136,11 +136,11 @@ class Recording(NamedTuple):
     Attributes
     ----------
     times
-        From the start of the motion, shape (m,) [s].
+        Times from the start of the motion, shape (m,) [s].
     positions
-        Of both joints, shape (m, 2) [rad].
+        Positions of both joints, shape (m, 2) [rad].
     efforts
-        Of joint 1, shape (m,) [N m].
+        Efforts of joint 1, shape (m,) [N m].
 
     """
 
@@ -156,7 +156,7 @@ class Result(NamedTuple):
     Attributes
     ----------
     scenario, strategy
-        Which run; the name of its method.
+        Scenario of the run, and the name of its method.
     rms_effort
         Time-RMS of the planned effort of joint 1 [N m].
     amplitude

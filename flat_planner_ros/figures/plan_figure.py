@@ -35,7 +35,7 @@ def draw_plan(track: Track, joints: Sequence[str], path: Path) -> None:
     Parameters
     ----------
     track
-        What is drawn.
+        Samples of the plan.
     joints
         Names of its columns, the passive joint last.
     path

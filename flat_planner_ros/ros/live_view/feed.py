@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What browsers are to be told: the newest values and a bounded past, safe between threads."""
+"""News for browsers: the newest values and a bounded past, safe between threads."""
 
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ DIGITS = 7
 
 @dataclass
 class Cursor:
-    """What one browser has been told: the run of the streams, rows of each, values by version."""
+    """Progress of one browser: the run of the streams, rows of each, values by version."""
 
     run: int = -1
     rows: dict[str, int] = field(default_factory=dict)
@@ -45,12 +45,11 @@ class Feed:
     Parameters
     ----------
     streams
-        Their names.
+        Names of the streams.
 
     """
 
     def __init__(self, streams: Iterable[str]) -> None:
-        """Start with nothing to tell."""
         self._lock = Lock()
         self._run = 0
         self._values: dict[str, tuple[int, Any]] = {}
@@ -114,7 +113,6 @@ class _Stream:
     """The newest rows and the number of all that there were."""
 
     def __init__(self) -> None:
-        """Start empty."""
         self.rows: deque[list[float | None]] = deque(maxlen=HISTORY)
         self.count = 0
 

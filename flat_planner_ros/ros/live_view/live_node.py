@@ -77,7 +77,7 @@ ROWS = {
     interfaces.PLANNER: {row.name: row for row in planner_parameters.ROWS},
     interfaces.PLANT: {row.name: row for row in plant_parameters.ROWS},
 }
-"""What they may be."""
+"""Rows of these parameters and of all others, by node and name."""
 
 SERVICES = {
     'replan': interfaces.topic_of(interfaces.PLANNER, interfaces.REPLAN),
@@ -102,17 +102,16 @@ class LiveNode(Node):
     Parameters
     ----------
     options
-        As for `rclpy.node.Node`.
+        Arguments of `rclpy.node.Node`.
 
     Attributes
     ----------
     feed
-        What browsers are to be told.
+        News for browsers.
 
     """
 
     def __init__(self, **options: Any) -> None:
-        """Open the interface."""
         super().__init__(LIVE_VIEW, **options)
         self.feed = Feed(STREAMS)
         self.feed.put('namespace', self.get_namespace())

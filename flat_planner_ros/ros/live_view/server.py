@@ -74,9 +74,9 @@ def application(feed: Feed, obey: Obey, hosts: Collection[str] = ()) -> web.Appl
     Parameters
     ----------
     feed
-        What browsers are told.
+        News for browsers.
     obey
-        Carries out what they ask for.
+        Carries out a browser's command.
     hosts
         Names besides `localhost` and plain addresses by which the server may be called.
 
@@ -100,7 +100,7 @@ class ServerThread:
     app
         The application.
     host, port
-        Where to listen; port 0 takes any that is free.
+        Address to listen at; port 0 takes any that is free.
 
     Raises
     ------
@@ -110,7 +110,6 @@ class ServerThread:
     """
 
     def __init__(self, app: web.Application, host: str, port: int) -> None:
-        """Listen, and start to serve."""
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self._socket = socket.create_server((host, port), family=family)
         self.port: int = self._socket.getsockname()[1]

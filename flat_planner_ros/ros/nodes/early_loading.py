@@ -28,10 +28,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 PLANNING = ('scipy.linalg.lapack', 'scipy.optimize')
-"""What planning through via points or in motion needs."""
+"""Modules that planning through via points or in motion needs."""
 
 REPORTING = ('scipy.fft', 'scipy.integrate', 'scipy.optimize')
-"""What the report on a motion needs."""
+"""Modules that the report on a motion needs."""
 
 DELAY = 0.1
 """Time from the node's start after which it answers and may load libraries [s]."""

@@ -35,16 +35,15 @@ class EffortStream:
     Parameters
     ----------
     node
-        Whose clock is used.
+        Node whose clock is used.
     publisher
-        Of std_msgs/Float64MultiArray.
+        Publisher of std_msgs/Float64MultiArray.
     session
-        Knows what is planned.
+        Session that knows what is planned.
 
     """
 
     def __init__(self, node: Node, publisher: Publisher, session: PlannerSession) -> None:
-        """Stream nothing until configured."""
         self._node, self._session = node, session
         self._publisher = publisher
         self._timer: Timer | None = None

@@ -37,7 +37,7 @@ class GraphWatch:
     Parameters
     ----------
     node
-        In whose name.
+        Node that complains.
     sole
         Topics that may have one publisher.
     shared
@@ -57,12 +57,12 @@ class GraphWatch:
         *,
         is_listening: bool = False,
     ) -> None:
-        """Look every WATCH_PERIOD, whatever the time of the graph does."""
         self._node = node
         self._sole = [node.resolve_topic_name(topic) for topic in sole]
         self._shared = [node.resolve_topic_name(topic) for topic in shared]
         self._is_listening = is_listening
         self._looks_to_excuse = 0
+        # Steady: whatever the time of the graph does.
         node.create_timer(WATCH_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def heard_other_part(self) -> None:

@@ -33,7 +33,7 @@ class ModelAdoption:
     Parameters
     ----------
     node
-        Whose parameters are set.
+        Node whose parameters are set.
     settings
         Returns the settings in force.
     last_start
@@ -50,7 +50,6 @@ class ModelAdoption:
         last_start: Callable[[], float | None],
         announce: Callable[[DiagnosticStatus], None],
     ) -> None:
-        """Open its topic and its service."""
         self._node = node
         self._settings, self._last_start, self._announce = settings, last_start, announce
         self._tuner = ModelTuner()

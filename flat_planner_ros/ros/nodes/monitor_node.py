@@ -58,25 +58,34 @@ WARNING_PERIOD = 5.0
 
 
 class MonitorNode(Node):
-    """Judges the oscillation after each motion of the latched plan."""
+    """Judges what each latched plan leaves behind; options as for `rclpy.node.Node`."""
 
     def __init__(self, **options: Any) -> None:
-        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.MONITOR, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._monitor = VibrationMonitor(self._configuration.settings)
         self._forget()
-        publish = self.create_publisher
-        self._residual = publish(JointState, interfaces.RESIDUAL, interfaces.RELIABLE)
-        self._reports = publish(DiagnosticArray, interfaces.REPORT, interfaces.LATCHED)
-        self._health = publish(DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE)
+        self._residual = self.create_publisher(
+            JointState, interfaces.RESIDUAL, interfaces.RELIABLE
+        )
+        self._reports = self.create_publisher(
+            DiagnosticArray, interfaces.REPORT, interfaces.LATCHED
+        )
+        self._health = self.create_publisher(
+            DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE
+        )
         plan = interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN)
-        listen = self.create_subscription
         # As bytes: the points of a long plan would take a second to become Python objects.
-        listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED, raw=True)
-        listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
+        self.create_subscription(
+            JointTrajectory, plan, self._on_plan, interfaces.LATCHED, raw=True
+        )
+        self.create_subscription(
+            JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA
+        )
         status = interfaces.topic_of(interfaces.PLANNER, interfaces.STATUS)
-        listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
+        self.create_subscription(
+            DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY
+        )
         self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.

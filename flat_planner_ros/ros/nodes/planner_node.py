@@ -42,31 +42,20 @@ WARNING_PERIOD = 5.0
 
 
 class PlannerNode(Node):
-    """Answers goals with motions of one arm."""
+    """Answers goals with motions of one arm; options as for `rclpy.node.Node`."""
 
     def __init__(self, **options: Any) -> None:
-        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         self._reader = conversions.JointStateReader(self._joints)
         self._sent_start: float | None = None
-        publish = self.create_publisher
-        self._command = publish(JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE)
-        self._plan = publish(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
-        self._flat_plan = publish(JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED)
-        efforts = publish(Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE)
+        self._open_publishers()
+        self._listen()
+        efforts = self.create_publisher(
+            Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
+        )
         self._efforts = EffortStream(self, efforts, self._session)
-        self._reference = publish(JointState, interfaces.REFERENCE, interfaces.RELIABLE)
-        self._status = publish(DiagnosticArray, interfaces.STATUS, interfaces.VERDICTS)
-        listen = self.create_subscription
-        # As bytes: a message that is too long is refused before it takes seconds to be read.
-        for kind, topic, heard in (
-            (JointTrajectory, interfaces.GOAL, self._on_goal),
-            (JointState, interfaces.GOAL_STATE, self._on_goal_state),
-        ):
-            listen(kind, topic, heard, interfaces.BURST, raw=True)
-        listen(JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA)
         self._adoption = ModelAdoption(
             self, lambda: self._settings, lambda: self._sent_start, self._publish_status
         )
@@ -77,6 +66,35 @@ class PlannerNode(Node):
         self._watch = GraphWatch(self, commands, [interfaces.JOINT_STATES], is_listening=True)
         self._apply(self._settings)
         load_early(self, PLANNING)
+
+    def _open_publishers(self) -> None:
+        """Offer commands, plans and verdicts."""
+        self._command = self.create_publisher(
+            JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE
+        )
+        self._plan = self.create_publisher(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
+        self._flat_plan = self.create_publisher(
+            JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED
+        )
+        self._reference = self.create_publisher(
+            JointState, interfaces.REFERENCE, interfaces.RELIABLE
+        )
+        self._status = self.create_publisher(
+            DiagnosticArray, interfaces.STATUS, interfaces.VERDICTS
+        )
+
+    def _listen(self) -> None:
+        """Subscribe to goals and joint states."""
+        # As bytes: a message that is too long is refused before it takes seconds to be read.
+        self.create_subscription(
+            JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.BURST, raw=True
+        )
+        self.create_subscription(
+            JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.BURST, raw=True
+        )
+        self.create_subscription(
+            JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA
+        )
 
     def destroy_node(self) -> None:
         """End the stream of efforts with zeros, then the node."""
@@ -104,13 +122,11 @@ class PlannerNode(Node):
 
     def _on_goal(self, data: bytes) -> None:
         """Answer a goal given as a trajectory."""
-        read = conversions.message_of
-        self._answer(lambda: conversions.goal_from_trajectory(read(data, JointTrajectory)))
+        self._answer(lambda: conversions.goal_from_trajectory(data))
 
     def _on_goal_state(self, data: bytes) -> None:
         """Answer a goal given as a pose."""
-        read = conversions.message_of
-        self._answer(lambda: conversions.goal_from_joint_state(read(data, JointState)))
+        self._answer(lambda: conversions.goal_from_joint_state(data))
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
@@ -164,7 +180,8 @@ class PlannerNode(Node):
 
     def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
         """Give a goal exactly one verdict and, if it is accepted, carry it out."""
-        goal, started = None, perf_counter()
+        goal = None
+        started = perf_counter()
         try:
             goal = read()
             motion = self._session.submit(goal, self._now(), self._now)

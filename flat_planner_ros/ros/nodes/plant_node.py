@@ -36,17 +36,16 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 CLOCK_START = 1.0
-"""Where /clock starts [s]; 0 would mean that there is no time yet."""
+"""First time on /clock [s]; 0 would mean that there is no time yet."""
 
 WARNING_PERIOD = 1.0
 """Time between two reports of what goes wrong again and again [s]."""
 
 
 class PlantNode(Node):
-    """Moves one simulated arm."""
+    """Moves one simulated arm; options as for `rclpy.node.Node`."""
 
     def __init__(self, **options: Any) -> None:
-        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.PLANT, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         settings = self._settings
@@ -56,10 +55,11 @@ class PlantNode(Node):
                 'cannot follow it, leave one of them out'
             )
         self._arm = PacedArm(settings.simulation, CLOCK_START if settings.publish_clock else None)
-        publish = self.create_publisher
-        self._joint_states = publish(JointState, interfaces.JOINT_STATES, interfaces.RELIABLE)
+        self._joint_states = self.create_publisher(
+            JointState, interfaces.JOINT_STATES, interfaces.RELIABLE
+        )
         if settings.publish_clock:
-            self._graph_time = publish(Clock, interfaces.CLOCK, interfaces.RELIABLE)
+            self._graph_time = self.create_publisher(Clock, interfaces.CLOCK, interfaces.RELIABLE)
         self._listen()
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # Steady: with use_sim_time, timers of the node's own clock wait for a /clock.

@@ -31,7 +31,6 @@ class StampClock:
     """
 
     def __init__(self) -> None:
-        """Wait for the first joint state."""
         self.stamp: float | None = None
         self._seen: float | None = None
         self._offset = 0.0

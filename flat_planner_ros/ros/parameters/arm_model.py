@@ -50,7 +50,7 @@ MODEL_ROWS = [
 """The nominal model; it may change at run time, but for the joints."""
 
 FIXED_MODEL_ROWS = [replace(row, read_only=True) for row in MODEL_ROWS]
-"""The same for a node whose arm is what it is."""
+"""The nominal model of a node whose arm cannot change."""
 
 LINK_ARRAYS = (
     'link_length',
@@ -82,14 +82,14 @@ def arm_of(
     values
         The nominal model.
     imbalance
-        What the last two links of the true arm lack of balance, as for `displaced_com` [kg m].
+        Static moments that the last two links of the true arm have too much [kg m].
 
     Raises
     ------
     InvalidParameter
         The model is incomplete, or given in both forms.
     FlatPlannerError
-        Its numbers are not those of a flat arm.
+        The numbers are not those of a flat arm.
 
     """
     joints = tuple(values.get('joints', ()))

@@ -99,7 +99,7 @@ def insensitivity_of(values: Values) -> Insensitivity:
     Raises
     ------
     InvalidRequest
-        They contradict each other.
+        The values contradict each other.
 
     """
     name = 'insensitivity'

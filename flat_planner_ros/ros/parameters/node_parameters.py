@@ -46,9 +46,9 @@ class NodeParameters(Generic[Settings]):
     Parameters
     ----------
     node
-        Whose parameters.
+        Node that declares them.
     rows
-        What to declare.
+        Table of all parameters.
     build
         Makes the settings of the values, or raises a FlatPlannerError that says why not.
     apply
@@ -68,7 +68,6 @@ class NodeParameters(Generic[Settings]):
         build: Callable[[Values], Settings],
         apply: Callable[[Settings], None],
     ) -> None:
-        """Declare, read and validate; then listen for changes."""
         self._node = node
         self._rows = {row.name: row for row in rows}
         self._build = build

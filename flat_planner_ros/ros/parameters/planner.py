@@ -31,7 +31,7 @@ import numpy as np
 
 
 class CommandStamp(Enum):
-    """What a command's stamp says."""
+    """Meaning of a command's stamp."""
 
     ABSOLUTE = 'absolute'
     ZERO = 'zero'
@@ -53,7 +53,7 @@ class PlannerSettings:
     auto_tune
         Whether estimates from the own last motion are adopted without being asked.
     report_advice, report_baselines
-        What the verdict on a goal says besides.
+        Additions to the verdict on a goal.
     stream_effort
         Whether `~/effort_commands` is published.
 
@@ -70,7 +70,7 @@ class PlannerSettings:
 
 
 LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
-"""What may be limited."""
+"""Quantities that may be limited."""
 
 ROWS = [
     *MODEL_ROWS,
@@ -264,7 +264,7 @@ def build(values: Values) -> PlannerSettings:
     Raises
     ------
     FlatPlannerError
-        They contradict each other, or ask for what this version does not have.
+        The values contradict each other, or ask for what this version does not have.
 
     """
     joints, arm = arm_of(values)

@@ -23,7 +23,7 @@ from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row, 
 
 
 class CommandInput(Enum):
-    """What moves the plant."""
+    """Kinds of command that move the plant."""
 
     TRAJECTORY = 'trajectory'
     EFFORT = 'effort'
@@ -39,9 +39,9 @@ class PlantSettings:
     joints
         Names of the arm's joints, the passive one last.
     simulation
-        What is simulated.
+        Settings of the simulation.
     command_input
-        What moves it.
+        Kind of command that moves the plant.
     publish_clock
         Whether the simulated time is the graph's time.
     real_time_factor
@@ -212,7 +212,7 @@ def build(values: Values) -> PlantSettings:
     Raises
     ------
     FlatPlannerError
-        They contradict each other or the model.
+        The values contradict each other or the model.
 
     """
     imbalance = values.get('mismatch.imbalance', (0.0, 0.0))

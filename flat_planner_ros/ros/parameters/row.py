@@ -70,16 +70,16 @@ class Row:
     Attributes
     ----------
     name
-        With its group, as ``duration.min``.
+        Name with its group, as ``duration.min``.
     given
         Value where none is set, from the core's settings where these have one; a member of an
         `Enum` for a choice among its values; a `Parameter.Type` for what may stay without a value.
     unit
         Unit of its numbers, empty where there is none to state.
     meaning
-        What it is, in half a sentence.
+        Half a sentence on what the parameter is.
     remark
-        What a special value means, or where the parameter counts.
+        Meaning of a special value, or where the parameter counts.
     lower, upper
         Range of every number in it.
     infinite
@@ -169,7 +169,7 @@ class Row:
         Raises
         ------
         InvalidParameter
-            With the name, the value and the constraint.
+            The message gives the name, the value and the constraint.
 
         """
         if self.choices and value not in self.choices:

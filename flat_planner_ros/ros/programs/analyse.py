@@ -108,20 +108,27 @@ def _parser() -> ArgumentParser:
         description="Compute the monitor's report on every motion in a recording: an MCAP file of "
         '"record" or ros2 bag, or a bag of another storage.',
     )
-    add = parser.add_argument
-    add('file', metavar='FILE', type=Path, help='MCAP file, or what ros2 bag has written')
-    add('--json', action='store_true', help='print the reports as JSON')
-    add('--plot', metavar='FILE.png', type=Path, help='draw the motions, a file for each')
-    add(
+    parser.add_argument(
+        'file', metavar='FILE', type=Path, help='MCAP file, or what ros2 bag has written'
+    )
+    parser.add_argument('--json', action='store_true', help='print the reports as JSON')
+    parser.add_argument(
+        '--plot', metavar='FILE.png', type=Path, help='draw the motions, a file for each'
+    )
+    parser.add_argument(
         '--params-file',
         metavar='FILE',
         type=Path,
         help="parameters of the monitor; by default the recorded ones, else no model's",
     )
-    add('--namespace', default='', metavar='NS', help='of the nodes, e.g. /arm1')
-    add('--plan', default='', metavar='TOPIC', help='JointTrajectory with plans or commands')
-    add('--joint-states', default='', metavar='TOPIC', help='measured JointState')
-    add('--window', type=float, metavar='S', help='time after a motion that is judged [s]')
+    parser.add_argument('--namespace', default='', metavar='NS', help='of the nodes, e.g. /arm1')
+    parser.add_argument(
+        '--plan', default='', metavar='TOPIC', help='JointTrajectory with plans or commands'
+    )
+    parser.add_argument('--joint-states', default='', metavar='TOPIC', help='measured JointState')
+    parser.add_argument(
+        '--window', type=float, metavar='S', help='time after a motion that is judged [s]'
+    )
     return parser
 
 

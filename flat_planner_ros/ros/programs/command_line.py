@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the optional programs share: their command lines, and a word on missing libraries."""
+"""Shared by the optional programs: their command lines, and a word on missing libraries."""
 
 from collections.abc import Sequence
 import sys

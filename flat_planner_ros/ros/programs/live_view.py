@@ -26,7 +26,7 @@ from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.programs.command_line import explain_missing, split_arguments
 
 HOST, PORT = '127.0.0.1', 8765
-"""Where the page is, by default: for browsers of this machine only."""
+"""Address of the page by default: for browsers of this machine only."""
 
 
 class NoAddress(FlatPlannerError):
@@ -92,10 +92,13 @@ def _parser() -> ArgumentParser:
         'and forms for goals and parameters.',
         epilog='Another namespace: --ros-args -r __ns:=/arm1',
     )
-    add = parser.add_argument
-    add('--host', default=HOST, help=f'address to listen at, {HOST} by default; think first')
-    add('--port', default=PORT, type=_port, help=f'{PORT} by default; 0 takes any free one')
-    add(
+    parser.add_argument(
+        '--host', default=HOST, help=f'address to listen at, {HOST} by default; think first'
+    )
+    parser.add_argument(
+        '--port', default=PORT, type=_port, help=f'{PORT} by default; 0 takes any free one'
+    )
+    parser.add_argument(
         '--allow-host',
         action='append',
         default=[],

@@ -45,7 +45,7 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 LEAD = 0.3
-"""From sending a goal to the start of its motion, in real time [s]."""
+"""Time from sending a goal to the start of its motion, in real time [s]."""
 
 DISCOVERY = 3.0
 """Time given to nodes that already run to be discovered [s]."""
@@ -76,7 +76,7 @@ PAUSE = 0.1
 """Real time between two tries of a goal [s]."""
 
 RECORDING = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
-"""For the joint states of one run: none is lost while this process is busy."""
+"""Quality of service for the joint states of one run: none is lost while this process is busy."""
 
 OURS = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
 """The nodes that take part."""
@@ -103,7 +103,7 @@ class Experimenter(Node):
     speed
         Simulated seconds per second.
     processes
-        Those of the nodes; the experiment ends when one of them does.
+        Processes of the nodes; the experiment ends when one of them does.
     interrupted
         Ends it, too.
 
@@ -112,7 +112,6 @@ class Experimenter(Node):
     def __init__(
         self, speed: float, processes: Sequence[Popen[bytes]], interrupted: Event
     ) -> None:
-        """Open the topics and services of the three nodes."""
         super().__init__('paper_table')
         self._lead = LEAD * max(speed, 1.0)
         self._processes = processes
@@ -307,7 +306,7 @@ def refuse_company(interrupted: Event) -> None:
     Raises
     ------
     ExperimentFailed
-        One is.
+        One of our nodes is running.
     Interrupted
         If the event is set meanwhile.
 

@@ -57,7 +57,7 @@ def read_urdf(
     params_file
         Parameter file; None for the paper's arm.
     namespace
-        Of the planner, for files with blocks by namespace.
+        Namespace of the planner, for files with blocks by namespace.
     drawn_length
         Length of link n-1 of an arm in reduced form, which does not tell it [m].
     control
@@ -84,7 +84,7 @@ def description_of(values: Values, *, drawn_length: float | None = None) -> ArmD
     Raises
     ------
     FlatPlannerError
-        They state none.
+        The parameters state no arm.
 
     """
     joints, arm = arm_of(values)

@@ -86,9 +86,10 @@ def _options(args: Sequence[str] | None) -> Namespace:
         epilog=EXAMPLES,
         formatter_class=RawDescriptionHelpFormatter,
     )
-    add = parser.add_argument
-    add('--params-file', metavar='FILE', type=Path, help='of the planner node; else its defaults')
-    add(
+    parser.add_argument(
+        '--params-file', metavar='FILE', type=Path, help='of the planner node; else its defaults'
+    )
+    parser.add_argument(
         '-p',
         '--parameter',
         metavar='NAME:=VALUE',
@@ -96,7 +97,7 @@ def _options(args: Sequence[str] | None) -> Namespace:
         default=[],
         help='another value of a parameter of the planner node; may be repeated',
     )
-    add(
+    parser.add_argument(
         '--final',
         metavar='ANGLE',
         type=float,
@@ -104,11 +105,13 @@ def _options(args: Sequence[str] | None) -> Namespace:
         required=True,
         help='final angle of every joint [rad], the passive one 0; may be left out at the end',
     )
-    add(
+    parser.add_argument(
         '--start', metavar='ANGLE', type=float, nargs='+', help='the same of the start; else zeros'
     )
-    add('--duration', metavar='SECONDS', type=float, required=True, help='of the motion')
-    add(
+    parser.add_argument(
+        '--duration', metavar='SECONDS', type=float, required=True, help='of the motion'
+    )
+    parser.add_argument(
         '--stretch',
         metavar='RATIO',
         type=float,
@@ -116,8 +119,8 @@ def _options(args: Sequence[str] | None) -> Namespace:
         default=STRETCHES,
         help='durations of the sweeps over that of the motion (default: 1 1.1 1.25 1.5)',
     )
-    add('--plot', metavar='FILE.png', type=Path, help='draw the picture')
-    add('--csv', metavar='FILE', type=Path, help='write the numbers')
+    parser.add_argument('--plot', metavar='FILE.png', type=Path, help='draw the picture')
+    parser.add_argument('--csv', metavar='FILE', type=Path, help='write the numbers')
     options = parser.parse_args(args)
     if options.plot is not None and find_spec('matplotlib') is None:
         parser.error('--plot needs matplotlib: pip install "flat_planner_ros[plot]"')

@@ -64,14 +64,14 @@ OURS = {
         interfaces.REPORT: (DIAGNOSTIC_ARRAY, interfaces.LATCHED),
     },
 }
-"""What is recorded of each of our nodes: topics with their types and qualities."""
+"""Topics of each of our nodes that are recorded, with their types and qualities."""
 
 SHARED = {
     interfaces.JOINT_STATES: (JOINT_STATE, interfaces.RELIABLE),
     interfaces.CLOCK: ('rosgraph_msgs/msg/Clock', interfaces.RELIABLE),
     PARAMETER_EVENTS: ('rcl_interfaces/msg/ParameterEvent', interfaces.RELIABLE),
 }
-"""What is recorded besides."""
+"""Other topics that are recorded."""
 
 
 class RecordingFailed(FlatPlannerError):
@@ -91,12 +91,12 @@ class RecorderNode(Node):
     overwrite
         Replace a file that exists.
     options
-        As for `rclpy.node.Node`.
+        Arguments of `rclpy.node.Node`.
 
     Attributes
     ----------
     failure
-        Why the file could not be written any further, empty if it can.
+        Reason why the file could not be written any further, empty if it can.
 
     Raises
     ------
@@ -113,7 +113,6 @@ class RecorderNode(Node):
         overwrite: bool = False,
         **options: Any,
     ) -> None:
-        """Open the file and listen."""
         super().__init__(RECORDER, **options)
         self._path = path
         self._everything = everything

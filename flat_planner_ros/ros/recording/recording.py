@@ -40,7 +40,7 @@ CHUNK_SIZE = 256 * 1024
 
 
 DAMAGES = (McapError, ZstdError, struct.error, ValueError, LookupError)
-"""What the library raises where a file is cut short or spoilt."""
+"""Errors of the library where a file is cut short or spoilt."""
 
 
 class UnreadableRecording(FlatPlannerError):
@@ -61,12 +61,11 @@ class RecordingWriter:
     Raises
     ------
     OSError
-        From every method: the file cannot be written.
+        In any method: the file cannot be written.
 
     """
 
     def __init__(self, path: Path, *, overwrite: bool = False) -> None:
-        """Open the file."""
         self._file = path.open('wb' if overwrite else 'xb')
         self._writer: Writer | None = Writer(
             self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD
@@ -172,17 +171,16 @@ class Recording:
     parameters : list[tuple]
         Parameters of nodes: time [ns since 1970], name with namespace, JSON text of the values.
     damage
-        Where and why reading ends early, empty for a complete recording.
+        Place and reason at which reading ends early, empty for a complete recording.
 
     Raises
     ------
     UnreadableRecording
-        It is nothing of this kind.
+        The path is neither.
 
     """
 
     def __init__(self, path: Path) -> None:
-        """See what there is."""
         self._path = path
         self.topics: dict[str, str] = {}
         self.parameters: list[tuple[int, str, str]] = []

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the monitor would have said, from a recording."""
+"""A monitor that is fed from a recording, and its reports."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -68,7 +68,8 @@ class Judgement:
     report, motion
         The verdict on what the motion left, and the motion.
     times
-        Of the samples from shortly before the motion to the end of the window [s], shape (m,).
+        Times of the samples, from shortly before the motion to the end of the window [s],
+        shape (m,).
     positions, efforts
         Measured [rad], [N m], shape (m, n); efforts are NaN where unknown.
 
@@ -90,9 +91,9 @@ def find_sources(
     Parameters
     ----------
     recording
-        Where they are.
+        Recording with the topics.
     namespace
-        Of the nodes, where the recording has several.
+        Namespace of the nodes, where the recording has several.
     plan, joint_states
         Names to take instead of the usual ones.
 
@@ -132,9 +133,9 @@ def replay(
     Parameters
     ----------
     recording
-        What was planned and measured.
+        Recording of what was planned and measured.
     sources
-        Where.
+        Topics with both.
     settings
         At least one; each holds from its time on [ns], the first from the start.
 
@@ -157,7 +158,6 @@ class _Player:
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
-        """Wait for a plan."""
         self.monitor = VibrationMonitor(settings)
         self.judgements: list[Judgement] = []
         self._stamp: float | None = None

@@ -39,35 +39,6 @@ MAX_GOAL_BYTES = 100_000
 """Longest goal that is read; 51 points of seven joints take a tenth of it."""
 
 
-def message_of(data: bytes, message_type: type[Message]) -> Message:
-    """
-    Return a serialised goal as a message.
-
-    A message with a hundred thousand points takes seconds to become Python objects; its length
-    tells beforehand that it is no goal.
-
-    Raises
-    ------
-    RequestRejected
-        It is longer than any goal may be.
-
-    """
-    if len(data) > MAX_GOAL_BYTES:
-        raise RequestRejected(
-            Reason.INVALID_GOAL,
-            f'the goal is {len(data)} bytes long, more than {MAX_GOAL_BYTES}',
-            value=float(len(data)),
-            limit=float(MAX_GOAL_BYTES),
-        )
-    try:
-        message: Message = deserialize_message(data, message_type)
-    except RuntimeError as error:
-        raise RequestRejected(
-            Reason.INVALID_GOAL, f'the goal cannot be read: {_first_line(error)}'
-        ) from error
-    return message
-
-
 def points_of(data: bytes) -> PointTable:
     """
     Return a serialised trajectory as tables.
@@ -75,7 +46,7 @@ def points_of(data: bytes) -> PointTable:
     Raises
     ------
     InvalidRequest
-        It is no trajectory.
+        The bytes are no trajectory.
 
     """
     points = read_points(data)
@@ -108,16 +79,17 @@ def points_of_message(msg: JointTrajectory) -> PointTable:
     )
 
 
-def goal_from_trajectory(msg: JointTrajectory) -> Goal:
+def goal_from_trajectory(data: bytes) -> Goal:
     """
-    Return the goal that a trajectory message states, unchecked but for its length.
+    Return the goal that a serialised trajectory states, unchecked but for its length.
 
     Raises
     ------
     RequestRejected
-        More points than any goal may have; they are not even copied.
+        The bytes are no trajectory, or one with more bytes or points than any goal may have.
 
     """
+    msg = _goal_message(data, JointTrajectory)
     check_point_count(len(msg.points))
     points = tuple(
         GoalPoint(
@@ -132,8 +104,17 @@ def goal_from_trajectory(msg: JointTrajectory) -> Goal:
     return Goal(joint_names=tuple(msg.joint_names), points=points, stamp=_stamp(msg))
 
 
-def goal_from_joint_state(msg: JointState) -> Goal:
-    """Return the goal that a joint state states: a final pose, the duration left open."""
+def goal_from_joint_state(data: bytes) -> Goal:
+    """
+    Return the goal that a serialised joint state states: a final pose, the duration left open.
+
+    Raises
+    ------
+    RequestRejected
+        The bytes are no joint state, or one with more bytes than any goal may have.
+
+    """
+    msg = _goal_message(data, JointState)
     point = GoalPoint(
         time=0.0,
         positions=tuple(msg.position),
@@ -141,6 +122,26 @@ def goal_from_joint_state(msg: JointState) -> Goal:
         effort=tuple(msg.effort),
     )
     return Goal(joint_names=tuple(msg.name), points=(point,), stamp=_stamp(msg))
+
+
+def _goal_message(data: bytes, message_type: type[Message]) -> Message:
+    """Return a serialised goal as a message, unless it is longer than any goal may be."""
+    # A message with a hundred thousand points takes seconds to become Python objects; its length
+    # tells beforehand that it is no goal.
+    if len(data) > MAX_GOAL_BYTES:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the goal is {len(data)} bytes long, more than {MAX_GOAL_BYTES}',
+            value=float(len(data)),
+            limit=float(MAX_GOAL_BYTES),
+        )
+    try:
+        message: Message = deserialize_message(data, message_type)
+    except RuntimeError as error:
+        raise RequestRejected(
+            Reason.INVALID_GOAL, f'the goal cannot be read: {_first_line(error)}'
+        ) from error
+    return message
 
 
 class JointStateReader:
@@ -152,12 +153,11 @@ class JointStateReader:
     Parameters
     ----------
     joints
-        Whose states are wanted, in this order.
+        Joints whose states are wanted, in this order.
 
     """
 
     def __init__(self, joints: Sequence[str]) -> None:
-        """Wait for the first message."""
         self.joints = list(joints)
         self._names: list[str] | None = None
         self._indices: NDArray[np.intp] | slice = slice(None)
@@ -166,7 +166,7 @@ class JointStateReader:
         """
         Return a measured state in the order of the arm's joints.
 
-        Its arrays may be views of the message's.
+        The arrays of the sample may be views of the message's.
 
         Parameters
         ----------

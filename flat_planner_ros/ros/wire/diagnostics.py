@@ -55,7 +55,7 @@ ENDINGS = {
     Outcome.STOPPED: 'has been brought to rest on the way',
     Outcome.PREEMPTED: 'is replaced by a later goal',
 }
-"""What a verdict says of each end of a motion."""
+"""Half a sentence on each end of a motion."""
 
 Values = Mapping[str, float | int | str | None]
 """Keys and values of a status; None for what is not known."""
@@ -97,11 +97,11 @@ def accepted_status(
     Parameters
     ----------
     motion, goal
-        What became of what.
+        The motion, and the goal that asked for it.
     joints
         The arm's joints, whose order the plan's arrays follow.
     planning_time
-        What it took [s].
+        Time that planning took [s].
     with_advice, with_baselines
         Whether to say when more time pays, and what simpler methods would leave behind.
 
@@ -115,26 +115,27 @@ def accepted_status(
         f'starts at {motion.start:.3f} s'
     )
     values: dict[str, float | int | str | None] = {
-        **_of_motion(motion, 'ACCEPTED'),
+        **_motion_values(motion, 'ACCEPTED'),
         'duration_min': motion.duration_min,
         'planning_time': planning_time,
         'boundary_residual': plan.boundary_residual,
         'optimality_residual': plan.optimality_residual,
         'cost': plan.cost_value,
-        **_of_residual(motion, with_advice=with_advice, with_baselines=with_baselines),
+        **_residual_values(motion, with_advice=with_advice, with_baselines=with_baselines),
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
-        values.update(_per_joint(quantity, joints, getattr(plan, quantity).tolist()))
+        values.update(_joint_values(quantity, joints, getattr(plan, quantity).tolist()))
     level = DiagnosticStatus.OK
     if motion.replaced_strategy is not None:
         level = DiagnosticStatus.WARN
         message += f'; not {motion.replaced_strategy.value}, which only plans from rest'
     if motion.exceeded is not None:
         use = motion.exceeded
-        level, name = DiagnosticStatus.WARN, joints[use.joint]
+        name = joints[use.joint]
+        level = DiagnosticStatus.WARN
         message += f'; stretched: as prescribed, {use.sentence(name)}'
         values.update(joint=name, value=use.value, limit=use.limit, time=use.time)
-    return status_msg(STATUS_NAME, level, message, {**values, **_echo(goal)})
+    return status_msg(STATUS_NAME, level, message, {**values, **_goal_values(goal)})
 
 
 def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStatus:
@@ -148,7 +149,7 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
         'limit': _precise(error.limit),
         'time': error.time,
         'duration_min': error.duration_min,
-        **({} if goal is None else _echo(goal)),
+        **({} if goal is None else _goal_values(goal)),
     }
     return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
 
@@ -157,7 +158,7 @@ def ended_status(ended: Ended) -> DiagnosticStatus:
     """Return the notice that a motion has ended, and how."""
     motion, outcome = ended
     message = f'plan {motion.plan_id} {ENDINGS[outcome]}'
-    values = _of_motion(motion, outcome.value)
+    values = _motion_values(motion, outcome.value)
     return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
 
 
@@ -238,7 +239,7 @@ def adopted_values(msg: DiagnosticArray) -> dict[str, float]:
 
 def report_status(report: VibrationReport) -> DiagnosticStatus:
     """Return what a motion has left behind."""
-    return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _of_report(report))
+    return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _report_values(report))
 
 
 def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> DiagnosticStatus:
@@ -250,7 +251,7 @@ def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> 
     report
         The last one, ``None`` before the first.
     phase
-        What the monitor is waiting for.
+        Event that the monitor is waiting for.
     dropped
         Number of unusable samples [-].
 
@@ -260,10 +261,12 @@ def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> 
         message = f'{phase}: no motion has been judged yet'
         return status_msg(REPORT_NAME, DiagnosticStatus.OK, message, state)
     message = f'{phase}; last motion: {report.message}'
-    return status_msg(REPORT_NAME, LEVELS[report.level], message, {**state, **_of_report(report)})
+    return status_msg(
+        REPORT_NAME, LEVELS[report.level], message, {**state, **_report_values(report)}
+    )
 
 
-def _of_report(report: VibrationReport) -> Values:
+def _report_values(report: VibrationReport) -> Values:
     """Return the numbers of a report."""
     seen = report.samples > 0
     return {
@@ -279,16 +282,16 @@ def _of_report(report: VibrationReport) -> Values:
         'settling_time': report.settling_time,
         'settled': report.settled if seen else None,
         'bias': report.bias,
-        **_per_joint('final_error', report.joint_names, report.final_error),
-        **_per_joint('rms_effort', report.joint_names, report.rms_effort),
+        **_joint_values('final_error', report.joint_names, report.final_error),
+        **_joint_values('rms_effort', report.joint_names, report.rms_effort),
         'window': report.window if seen else None,
         'samples': report.samples,
         'fit_rms': report.fit_rms,
-        **_of_estimate(report.estimate),
+        **_estimate_values(report.estimate),
     }
 
 
-def _of_estimate(estimate: StiffnessEstimate | None) -> Values:
+def _estimate_values(estimate: StiffnessEstimate | None) -> Values:
     """Return an estimate that can be trusted, else nothing."""
     if estimate is None or not estimate.trustworthy or estimate.case is None:
         return {}
@@ -302,7 +305,7 @@ def _of_estimate(estimate: StiffnessEstimate | None) -> Values:
     }
 
 
-def _of_residual(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:
+def _residual_values(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:
     """Return what a motion is predicted to leave behind, and what others would."""
     try:
         residual = residual_of_plan(motion.plan, motion.samples)
@@ -324,14 +327,14 @@ def _of_residual(motion: Motion, *, with_advice: bool, with_baselines: bool) -> 
     return values
 
 
-def _per_joint(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:
+def _joint_values(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:
     """Return a quantity of each joint, or of none."""
     if not values:
         return {}
     return {f'{quantity}.{j}': value for j, value in zip(joints, values, strict=True)}
 
 
-def _of_motion(motion: Motion, state: str) -> Values:
+def _motion_values(motion: Motion, state: str) -> Values:
     """Return the values that tell which motion a status is about."""
     options = motion.plan.options
     return {
@@ -346,7 +349,7 @@ def _of_motion(motion: Motion, state: str) -> Values:
     }
 
 
-def _echo(goal: Goal) -> Values:
+def _goal_values(goal: Goal) -> Values:
     """Return the goal in brief: what it names, its final pose, its stamp."""
     final = goal.points[-1] if goal.points else None
     return {

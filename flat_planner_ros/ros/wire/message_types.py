@@ -39,12 +39,12 @@ def message_class(name: str) -> Any:
     Parameters
     ----------
     name
-        With its package, e.g. ``sensor_msgs/msg/JointState``.
+        Name with its package, e.g. ``sensor_msgs/msg/JointState``.
 
     Raises
     ------
     UnknownType
-        Its package is not installed, or has no such type.
+        The package is not installed, or has no such type.
 
     """
     package, _, kind = _parts(name)
@@ -61,12 +61,12 @@ def definition(name: str) -> str:
     Parameters
     ----------
     name
-        With its package, e.g. ``sensor_msgs/msg/JointState``.
+        Name with its package, e.g. ``sensor_msgs/msg/JointState``.
 
     Raises
     ------
     UnknownType
-        One of them is not installed with its definition.
+        A type is not installed with its definition.
 
     """
     package, _, kind = _parts(name)

@@ -47,15 +47,15 @@ class PointTable(NamedTuple):
     Attributes
     ----------
     joint_names
-        As stated.
+        Names of the joints.
     stamp
-        Of the header [s], 0 if there is none.
+        Stamp of the header [s], 0 if there is none.
     times
-        Of the points from the start [s], shape (m,).
+        Times of the points from the start [s], shape (m,).
     fields
         Tables by the names of the arrays, each of shape (m, width), width 0 if no point has any.
     misfits
-        What is wrong with the arrays that are no table, by their names.
+        Sentences on the arrays that are no table, by their names.
 
     """
 
@@ -127,7 +127,7 @@ class _Front:
     data
         The message.
     order
-        Its byte order.
+        Byte order of the message.
 
     Attributes
     ----------
@@ -137,7 +137,6 @@ class _Front:
     """
 
     def __init__(self, data: bytes, order: str) -> None:
-        """Begin after the encapsulation."""
         self._data = data
         self._length = Struct(f'{order}I')
         self._stamp = f'{order}iI'

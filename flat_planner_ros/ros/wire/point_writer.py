@@ -41,7 +41,7 @@ STAMP = struct.Struct('=iI')
 """Seconds and nanoseconds."""
 
 NANOSECONDS = 1_000_000_000
-"""In one second."""
+"""Nanoseconds in one second."""
 
 
 def trajectory_bytes(
@@ -56,11 +56,11 @@ def trajectory_bytes(
     Parameters
     ----------
     names
-        Of the joints.
+        Names of the joints.
     stamp
         Seconds and nanoseconds of the header.
     times
-        Of the points from the start [s], at least one, shape (m,).
+        Times of the points from the start [s], at least one, shape (m,).
     tables
         Fields of the points in the order of the message, each of shape (m, n); fields that are
         left out at the end are empty.

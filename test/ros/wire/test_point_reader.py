@@ -199,7 +199,7 @@ def test_corrupted_bytes_are_read_alike_or_refused_in_one_sentence(data, changes
         with pytest.raises(InvalidRequest, match=r'^it cannot be read: [^\n]+$'):
             conversions.points_of(corrupt)
         with pytest.raises(RequestRejected, match=r'^the goal cannot be read: [^\n]+$'):
-            conversions.message_of(corrupt, JointTrajectory)
+            conversions.goal_from_trajectory(corrupt)
     else:
         points = conversions.points_of(corrupt)
         assert_same(points, conversions.points_of_message(expected))
