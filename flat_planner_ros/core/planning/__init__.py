@@ -16,7 +16,7 @@
 
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
-from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation, TimedPlan
+from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.free_conditions import stop_plan, with_via_times
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
@@ -61,7 +61,6 @@ __all__ = [
     'RequestRejected',
     'shortest_plan',
     'stop_plan',
-    'TimedPlan',
     'DurationRules',
     'tradeoff_points',
     'TradeoffPoint',

@@ -44,27 +44,6 @@ class OnViolation(Enum):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TimedPlan:
-    """
-    A plan within limits, and how its duration came about.
-
-    Attributes
-    ----------
-    plan
-        It obeys all limits.
-    duration_min
-        The shortest duration that does; None where it was not asked for [s].
-    exceeded
-        What the prescribed duration would have exceeded; None unless the motion was stretched.
-
-    """
-
-    plan: Plan
-    duration_min: float | None = None
-    exceeded: LimitUse | None = None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class DurationRules:
     """
     Rules for durations.
@@ -113,9 +92,11 @@ class DurationRules:
             limit=use.limit,
         )
 
-    def timed(self, plan_of: Callable[[float], Plan], duration: float | None) -> TimedPlan:
+    def plan_within(
+        self, plan_of: Callable[[float], Plan], duration: float | None
+    ) -> tuple[Plan, LimitUse | None]:
         """
-        Return the plan of a motion within the limits.
+        Return the plan of a motion within the limits, and what stretched it.
 
         Parameters
         ----------
@@ -123,6 +104,12 @@ class DurationRules:
             Plan of a duration [s].
         duration
             Prescribed [s]; None for the shortest that obeys the limits.
+
+        Returns
+        -------
+        tuple[Plan, LimitUse | None]
+            The plan obeys all limits. If it takes longer than prescribed, the limit that the
+            prescribed duration would have exceeded; else None.
 
         Raises
         ------
@@ -133,17 +120,16 @@ class DurationRules:
 
         """
         if duration is None:
-            found = self._shortest(plan_of, self.shortest)
-            return TimedPlan(plan=found, duration_min=found.duration)
+            return self._shortest(plan_of, self.shortest), None
         prescribed = plan_of(duration)
         use = self.limits.worst(prescribed)
         if use is None or not use.exceeded:
-            return TimedPlan(plan=prescribed)
+            return prescribed, None
         scales = self.on_violation is OnViolation.SCALE
         # To stretch is to take longer, even if something shorter obeys as well.
         found = self._shortest(plan_of, duration if scales else self.shortest, use)
         if scales:
-            return TimedPlan(plan=found, duration_min=found.duration, exceeded=use)
+            return found, use
         remedy = f'the shortest feasible duration is {found.duration:.9g} s'
         raise self._rejection(use, f'{self._sentence(use)}; {remedy}', found.duration)
 

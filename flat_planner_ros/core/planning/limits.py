@@ -173,7 +173,7 @@ class JointLimits:
         return tuple(quantity for quantity, joints in finite.items() if joints.any())
 
     @property
-    def bound_duration(self) -> bool:
+    def bounds_duration(self) -> bool:
         """Tell whether anything keeps a motion from being arbitrarily short."""
         return bool(set(self.quantities) - {Quantity.POSITION})
 

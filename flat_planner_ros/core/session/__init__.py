@@ -14,7 +14,7 @@
 
 """Session: goals and measurements in, motions and verdicts out, in the order of time."""
 
-from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint, rest_target
+from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint
 from flat_planner_ros.core.session.session import Ended, Outcome, PlannerSession
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
@@ -27,7 +27,6 @@ __all__ = [
     'Motion',
     'Outcome',
     'PlannerSession',
-    'rest_target',
     'SessionSettings',
     'StartSource',
     'Timeline',

@@ -15,10 +15,9 @@
 """Goals as users send them, and the rules that an admissible one obeys (docs/interfaces.md)."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import NamedTuple
 
 from flat_planner_ros.core.planning import Reason, RequestRejected
 
@@ -73,52 +72,15 @@ class Goal:
     points: tuple[GoalPoint, ...]
     stamp: float | None = None
 
-
-class Waypoint(NamedTuple):
-    """
-    Where a motion passes.
-
-    Attributes
-    ----------
-    positions
-        Angles in kinematic order, the passive joint last and zero [rad].
-    time
-        From the start of the motion [s]; None when the planner is to choose.
-
-    """
-
-    positions: tuple[float, ...]
-    time: float | None
-
-
-class RestTarget(NamedTuple):
-    """
-    What an admissible goal asks for.
-
-    Attributes
-    ----------
-    positions
-        Final angles in kinematic order, the passive joint last and zero [rad].
-    duration
-        Prescribed time of the motion [s]; None when the planner is to choose.
-    via
-        Points to pass on the way, in the order of time.
-
-    """
-
-    positions: tuple[float, ...]
-    duration: float | None
-    via: tuple[Waypoint, ...] = ()
-
     @property
-    def chooses_times(self) -> bool:
-        """Whether there are via points whose times the planner is to choose."""
-        return bool(self.via) and self.duration is None
+    def duration(self) -> float | None:
+        """Prescribed time of the whole motion [s]; None when the planner is to choose."""
+        return self.points[-1].time or None
 
 
-def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
+def checked_goal(goal: Goal, joints: Sequence[str]) -> Goal:
     """
-    Return the target of a goal that obeys every rule.
+    Return a goal that obeys every rule, by all joints in kinematic order.
 
     Parameters
     ----------
@@ -136,15 +98,13 @@ def rest_target(goal: Goal, joints: Sequence[str]) -> RestTarget:
     _check_joints(goal, joints)
     for index, point in enumerate(goal.points):
         _check_point(goal, index, point)
-    duration = _checked_duration(goal)
-    for point in goal.points[:-1]:
-        _check_only_passed(goal, point)
-    _check_rest(goal, goal.points[-1])
-    *via, final = (_angles(goal, point, joints) for point in goal.points)
-    if duration is None:
-        return RestTarget(final, None, tuple(Waypoint(angles, None) for angles in via))
-    times = (point.time for point in goal.points)
-    return RestTarget(final, duration, tuple(map(Waypoint, via, times)))
+    _check_times(goal)
+    for point in goal.points:
+        _check_derivatives(goal, point)
+    points = tuple(
+        GoalPoint(time=point.time, positions=_angles(goal, point, joints)) for point in goal.points
+    )
+    return Goal(joint_names=tuple(joints), points=points, stamp=goal.stamp)
 
 
 def check_point_count(count: int) -> None:
@@ -196,33 +156,31 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
             limit=0.0,
             time=point.time,
         )
-    for quantity, values in (
-        ('positions', point.positions),
-        ('velocities', point.velocities),
-        ('accelerations', point.accelerations),
-    ):
+    for quantity in ('positions', 'velocities', 'accelerations'):
+        values = getattr(point, quantity)
         if len(values) != count and (values or quantity == 'positions'):
+            message = f'point {index} has {len(values)} {quantity} for {count} joints'
             raise RequestRejected(
                 Reason.SIZE_MISMATCH,
-                f'point {index} has {len(values)} {quantity} for {count} joints',
+                message,
                 value=float(len(values)),
                 limit=float(count),
                 time=point.time,
             )
         for name, value in zip(goal.joint_names, values, strict=False):
             if not isfinite(value):
+                message = f'{quantity} of {name} in point {index} are not finite: {value}'
                 raise RequestRejected(
-                    Reason.NON_FINITE,
-                    f'{quantity} of {name} in point {index} are not finite: {value}',
-                    joint=name,
-                    value=value,
-                    time=point.time,
+                    Reason.NON_FINITE, message, joint=name, value=value, time=point.time
                 )
     for name, value in zip(goal.joint_names, point.positions, strict=True):
         if abs(value) > MAX_ANGLE:
+            message = (
+                f'position {value:g} rad of {name} in point {index} exceeds {MAX_ANGLE:g} rad'
+            )
             raise RequestRejected(
                 Reason.POSITION_LIMIT,
-                f'position {value:g} rad of {name} in point {index} exceeds {MAX_ANGLE:g} rad',
+                message,
                 joint=name,
                 value=value,
                 limit=MAX_ANGLE,
@@ -230,42 +188,30 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
             )
 
 
-def _check_rest(goal: Goal, final: GoalPoint) -> None:
-    """Refuse an end in motion."""
-    for quantity, name, value in _moving(goal, final):
-        raise RequestRejected(
-            Reason.NONZERO_END_STATE,
-            f'the motion must end at rest, but the final {quantity} of {name} is {value:g}; '
-            f'leave it out or set it to 0',
-            joint=name,
-            value=value,
-            limit=0.0,
-        )
-
-
-def _check_only_passed(goal: Goal, point: GoalPoint) -> None:
-    """Refuse velocities and accelerations of via points, which the planner chooses."""
-    for quantity, name, value in _moving(goal, point):
-        raise RequestRejected(
-            Reason.INVALID_GOAL,
-            f'via points prescribe positions only, but there the {quantity} of {name} is '
-            f'{value:g}; leave it out, the planner chooses it',
-            joint=name,
-            value=value,
-            limit=0.0,
-            time=point.time,
-        )
-
-
-def _moving(goal: Goal, point: GoalPoint) -> Iterator[tuple[str, str, float]]:
-    """Yield the quantity, joint and value of every derivative of a point that is not zero."""
+def _check_derivatives(goal: Goal, point: GoalPoint) -> None:
+    """Refuse an end in motion, and derivatives at via points, which the planner chooses."""
     for quantity, values in (
         ('velocity', point.velocities),
         ('acceleration', point.accelerations),
     ):
         for name, value in zip(goal.joint_names, values, strict=False):
-            if value != 0.0:
-                yield quantity, name, value
+            if value == 0.0:
+                continue
+            if point is goal.points[-1]:
+                message = (
+                    f'the motion must end at rest, but the final {quantity} of {name} is '
+                    f'{value:g}; leave it out or set it to 0'
+                )
+                raise RequestRejected(
+                    Reason.NONZERO_END_STATE, message, joint=name, value=value, limit=0.0
+                )
+            message = (
+                f'via points prescribe positions only, but there the {quantity} of {name} is '
+                f'{value:g}; leave it out, the planner chooses it'
+            )
+            raise RequestRejected(
+                Reason.INVALID_GOAL, message, joint=name, value=value, limit=0.0, time=point.time
+            )
 
 
 def _angles(goal: Goal, point: GoalPoint, joints: Sequence[str]) -> tuple[float, ...]:
@@ -286,29 +232,21 @@ def _angles(goal: Goal, point: GoalPoint, joints: Sequence[str]) -> tuple[float,
     return tuple(angles[name] for name in joints)
 
 
-def _checked_duration(goal: Goal) -> float | None:
-    """Return the prescribed duration, None for an automatic one."""
+def _check_times(goal: Goal) -> None:
+    """Refuse times that are neither all zero nor increase from above zero."""
     times = [point.time for point in goal.points]
     if not any(times):
-        return None
+        return
     previous = 0.0
     for index, time in enumerate(times):
-        if time == 0.0:
-            raise RequestRejected(
-                Reason.TIME_NOT_INCREASING,
-                f'time_from_start is zero in point {index}, but not in all points',
-                value=time,
-                limit=previous,
-                time=time,
-            )
         if not time > previous:
-            raise RequestRejected(
-                Reason.TIME_NOT_INCREASING,
+            message = (
                 f'time_from_start must be zero in all points or increase from above zero, but '
-                f'point {index} has {time:g} s after {previous:g} s',
-                value=time,
-                limit=previous,
-                time=time,
+                f'point {index} has {time:g} s after {previous:g} s'
+            )
+            if time == 0.0:
+                message = f'time_from_start is zero in point {index}, but not in all points'
+            raise RequestRejected(
+                Reason.TIME_NOT_INCREASING, message, value=time, limit=previous, time=time
             )
         previous = time
-    return times[-1]

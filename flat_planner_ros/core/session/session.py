@@ -19,20 +19,39 @@ from dataclasses import replace
 from enum import Enum
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import JointSample
-from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected, stop_plan
-from flat_planner_ros.core.session.answer import answer
-from flat_planner_ros.core.session.goal import Goal, rest_target
-from flat_planner_ros.core.session.rest_start import RestStart
+from flat_planner_ros.core.arm import InvalidRequest, JointSample, OutOfReach, UncertifiedPlan
+from flat_planner_ros.core.planning import (
+    LimitUse,
+    MotionRequest,
+    Plan,
+    plan,
+    planned_at_rest,
+    PlanSamples,
+    Reason,
+    RequestRejected,
+    stop_plan,
+    ViaPoint,
+    with_via_times,
+)
+from flat_planner_ros.core.session.goal import checked_goal, Goal
+from flat_planner_ros.core.session.motion_start import (
+    check_carried_out,
+    check_stamp,
+    MotionStart,
+    pose_at_rest,
+    splice,
+)
 from flat_planner_ros.core.session.settings import SessionSettings
-from flat_planner_ros.core.session.takeover import check_follows, Origin, takeover, too_late
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 import numpy as np
 
 Clock = Callable[[], float]
 
-HANDOVER = 0.25
+DELIVERY_SHARE = 0.25
 """Part of the lookahead that is left for a command to reach its executor [-]."""
+
+NOMINAL_DURATION = 1.0
+"""Duration of a request before its own is found [s]."""
 
 
 class Outcome(Enum):
@@ -69,7 +88,7 @@ class PlannerSession:
     def __init__(self, settings: SessionSettings) -> None:
         """Start at rest, without a measurement."""
         self.settings = settings
-        self._rest = RestStart()
+        self._measured: JointSample | None = None
         self._timeline = Timeline()
         self._motion: Motion | None = None
         self._ended: list[Ended] = []
@@ -99,11 +118,14 @@ class PlannerSession:
     @property
     def measured(self) -> JointSample | None:
         """Return the last measured state, None before the first."""
-        return self._rest.measured
+        return self._measured
 
     def measure(self, sample: JointSample) -> None:
         """Take the measured state, in the order of the session's joints, unless it comes late."""
-        self._rest.measure(sample, self.settings.measurement_timeout)
+        age = 0.0 if self._measured is None else self._measured.time - sample.time
+        # Far back is no late message, but a clock that was set back.
+        if not 0.0 < age <= self.settings.joint_state_timeout:
+            self._measured = sample
 
     def submit(self, goal: Goal, now: float, clock: Clock | None = None) -> Motion:
         """
@@ -129,25 +151,25 @@ class PlannerSession:
         """
         _check_time(now)
         settings = self.settings
-        target = rest_target(goal, settings.joints)
-        duration = settings.checked_duration(target.duration)
-        origin = self._origin(goal.stamp, now)
-        if origin.before is not None:
-            check_follows(settings, self._timeline, self._rest.measured, now)
-        timed = answer(settings, origin, target, duration)
+        asked = checked_goal(goal, settings.joints)
+        duration = settings.checked_duration(asked.duration)
+        start = self._start(goal.stamp, now)
+        if start.running is not None:
+            check_carried_out(settings, self._timeline, self._measured, now)
+        found, exceeded = _plan_of_goal(settings, start, asked, duration)
         wanted = settings.options.strategy
         motion = Motion(
             plan_id=self._count + 1,
-            plan=timed.plan,
-            samples=timed.plan.sample(settings.period),
-            start=origin.time,
+            plan=found,
+            samples=found.sample(settings.period),
+            start=start.time,
             planned_at=now,
-            duration_min=timed.duration_min,
-            exceeded=timed.exceeded,
-            replaced_strategy=None if timed.plan.options.strategy is wanted else wanted,
+            is_shortest=found.duration != duration,
+            exceeded=exceeded,
+            replaced_strategy=None if found.options.strategy is wanted else wanted,
         )
-        motion = self._launched(motion, origin, goal.stamp, clock)
-        self._last_goal = Goal(joint_names=goal.joint_names, points=goal.points)
+        motion = self._accepted(motion, start, goal.stamp, clock)
+        self._last_goal = replace(goal, stamp=None)
         return motion
 
     def stop(self, now: float, clock: Clock | None = None) -> Motion | None:
@@ -168,29 +190,29 @@ class PlannerSession:
         _check_time(now)
         if not self._timeline.is_busy(now):
             return None
-        origin = self._origin(None, now)
-        running = origin.before
-        if running is None or running.stops or (origin.jets is None and now >= running.start):
+        start = self._start(None, now)
+        running = start.running
+        if running is None or running.is_stop or (start.jets is None and now >= running.start):
             raise RequestRejected(
                 Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
             )
-        limits = self.settings.duration_rules(origin.pose).limits
-        remaining = running.end - origin.time
-        planned = stop_plan(running.plan, origin.pose, origin.jets, remaining, limits)
+        limits = self.settings.duration_rules(start.pose).limits
+        remaining = running.end - start.time
+        planned = stop_plan(running.plan, start.pose, start.jets, remaining, limits)
         motion = Motion(
             plan_id=running.plan_id,
             plan=planned,
             samples=planned.sample(self.settings.period),
-            start=origin.time,
+            start=start.time,
             planned_at=now,
-            stops=True,
+            is_stop=True,
         )
-        return self._launched(motion, origin, None, clock)
+        return self._accepted(motion, start, None, clock)
 
-    def ended(self, now: float) -> list[Ended]:
+    def take_ended(self, now: float) -> list[Ended]:
         """Return, once, the motions that have come to an end or been replaced."""
         ended = [
-            Ended(motion, Outcome.STOPPED if motion.stops else Outcome.FINISHED)
+            Ended(motion, Outcome.STOPPED if motion.is_stop else Outcome.FINISHED)
             for motion in self._timeline.motions
             if motion.cut is None and motion.end <= now
         ]
@@ -214,51 +236,49 @@ class PlannerSession:
         motion = self._timeline.at(now) or self._motion
         return None if motion is None else motion.reference(now)
 
-    def _launched(
-        self, motion: Motion, origin: Origin, stamp: float | None, clock: Clock | None
+    def _accepted(
+        self, motion: Motion, start: MotionStart, stamp: float | None, clock: Clock | None
     ) -> Motion:
         """Return a motion with its place in time, which it takes unless planning took too long."""
         settings = self.settings
         now = motion.planned_at if clock is None else clock()
-        if origin.before is None:
+        if start.running is None:
+            check_stamp(stamp, now)
             if stamp is None:
                 motion = replace(motion, start=now + settings.start_delay)
-            elif stamp < now:
-                raise too_late(stamp, now)
-        elif origin.time - now < HANDOVER * settings.lookahead and clock is not None:
+        elif start.time - now < DELIVERY_SHARE * settings.lookahead and clock is not None:
             raise RequestRejected(
                 Reason.BUSY,
                 f'planning took {now - motion.planned_at:.3f} s, too long for a start in motion '
                 f'{settings.lookahead:g} s ahead (replan.lookahead); the motion goes on',
                 value=now - motion.planned_at,
-                limit=(1.0 - HANDOVER) * settings.lookahead,
+                limit=(1.0 - DELIVERY_SHARE) * settings.lookahead,
             )
         if settings.execute:
             for old in self._timeline.replaced(motion.start):
-                if not (motion.stops and old.plan_id == motion.plan_id):
+                if not (motion.is_stop and old.plan_id == motion.plan_id):
                     self._ended.append(Ended(old, Outcome.PREEMPTED))
             self._timeline = self._timeline.with_motion(motion)
-        self._count = motion.plan_id if not motion.stops else self._count
+        if not motion.is_stop:
+            self._count = motion.plan_id
         self._motion = motion
         return motion
 
-    def _origin(self, stamp: float | None, now: float) -> Origin:
+    def _start(self, stamp: float | None, now: float) -> MotionStart:
         """Return where a motion starts."""
         settings = self.settings
-        if stamp is not None and stamp < now:
-            raise too_late(stamp, now)
+        check_stamp(stamp, now)
         if not self._timeline.is_busy(now):
             time = now + settings.start_delay if stamp is None else stamp
-            reference = None if self._motion is None else self._motion.plan.request.final.tolist()
-            pose = self._rest.pose(settings, reference, now)
-            return Origin(time, np.array(pose))
+            reference = None if self._motion is None else self._motion.plan.request.final
+            return MotionStart(time, pose_at_rest(settings, self._measured, reference, now))
         if not settings.is_stamped:
             raise RequestRejected(
                 Reason.BUSY,
                 'another motion is under way; none can take over from it as commands have no '
                 'stamp (command.stamp)',
             )
-        return takeover(self._timeline, stamp, now + settings.lookahead)
+        return splice(self._timeline, stamp, now + settings.lookahead)
 
 
 def _check_time(now: float) -> None:
@@ -268,3 +288,67 @@ def _check_time(now: float) -> None:
             Reason.START_STATE_UNKNOWN,
             'there is no time yet: use_sim_time is set, but no /clock has been received',
         )
+
+
+def _plan_of_goal(
+    settings: SessionSettings, start: MotionStart, goal: Goal, duration: float | None
+) -> tuple[Plan, LimitUse | None]:
+    """Return the plan of a checked goal within the limits, and what made it longer than asked."""
+    arm, options = settings.arm, settings.options
+    if start.jets is not None and start.running is not None:
+        # What the arm is planned to do then is said in terms of the model it was planned with.
+        arm = start.running.plan.problem.arm
+        options = replace(options, flat_model=start.running.plan.options.flat_model)
+    rules = settings.duration_rules(start.pose)
+    rules.check_pose('the start', start.pose)
+    *via, final = (np.array(point.positions) for point in goal.points)
+    for index, positions in enumerate(via):
+        rules.check_pose(f'via point {index}', positions)
+    rules.check_pose('the final', final)
+
+    def within_limits(request: MotionRequest) -> tuple[Plan, LimitUse | None]:
+        return rules.plan_within(
+            lambda time: plan(request.stretched(time), arm, options), duration
+        )
+
+    try:
+        request = _request(goal, start, duration or NOMINAL_DURATION)
+        if not via or goal.duration is not None:
+            return within_limits(request)
+        found, exceeded = within_limits(with_via_times(request, arm, options))
+        if duration is not None:
+            return found, exceeded
+        # The best shares of the time depend on the time, if little.
+        return within_limits(with_via_times(found.request, arm, options))
+    except InvalidRequest as error:
+        raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
+    except OutOfReach as error:
+        raise RequestRejected(
+            Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
+        ) from error
+    except UncertifiedPlan as error:
+        raise RequestRejected(
+            Reason.ILL_CONDITIONED,
+            f'no plan to the promised accuracy: {error}; use a longer duration or smaller weights',
+            value=error.residual,
+            limit=error.tolerance,
+        ) from error
+
+
+def _request(goal: Goal, start: MotionStart, duration: float) -> MotionRequest:
+    """Return what is asked of a plan; via times that are to be chosen are even for now."""
+    *passed, final = goal.points
+    via = tuple(
+        ViaPoint(
+            time=point.time or duration * index / len(goal.points),
+            values=np.array(planned_at_rest(np.array(point.positions))),
+        )
+        for index, point in enumerate(passed, start=1)
+    )
+    return MotionRequest(
+        start=start.pose,
+        final=np.array(final.positions),
+        duration=duration,
+        via=via,
+        start_jets=start.jets,
+    )

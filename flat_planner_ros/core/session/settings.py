@@ -38,7 +38,7 @@ class StartSource(Enum):
     """The measured state, unless another motion is under way or waits for its start."""
 
     MEASURED = 'measured'
-    """The measured state of the actuated joints, the elastic one relaxed."""
+    """The measured state of the actuated joints, the passive one relaxed."""
 
     REFERENCE = 'reference'
     """The end of the last motion, checked against a measured state if there is one."""
@@ -74,8 +74,8 @@ class SessionSettings:
         Start for the source `parameter`, shape (n,) [rad].
     position_tolerance, velocity_tolerance
         Largest deviation of a measured start from rest at the planned one [rad, rad/s].
-    measurement_timeout
-        Age from which a measurement is stale [s].
+    joint_state_timeout
+        Age from which a measured state is stale [s].
     start_delay
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
@@ -104,7 +104,7 @@ class SessionSettings:
     start_position: tuple[float, ...] = ()
     position_tolerance: float = 0.01
     velocity_tolerance: float = 0.1
-    measurement_timeout: float = 0.5
+    joint_state_timeout: float = 0.5
     start_delay: float = 0.05
     lookahead: float = 0.1
     replan_tolerance: float = 0.5
@@ -156,7 +156,7 @@ class SessionSettings:
         """
         duration = self.default_duration if prescribed is None else prescribed
         if duration == 0.0:
-            if self.limits is None or not self.limits.bound_duration:
+            if self.limits is None or not self.limits.bounds_duration:
                 raise RequestRejected(
                     Reason.DURATION_OUT_OF_RANGE,
                     'the goal prescribes no duration, and no limit of a velocity or an effort '

@@ -18,7 +18,7 @@ Timeline: the motions that are still to be carried out, and the one command that
 A goal replaces whatever was planned from its start on. The start of the new motion is the state
 that the old one plans for that time, so that the effort has no step, and what is left of the old
 one until then is sent along with the new one: an executor that skips past points cannot notice the
-seam (docs/derivation.md, section S).
+splice (docs/derivation.md, section S).
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.planning import LimitUse, Plan, PlanSamples, Strategy
 import numpy as np
 
-SEAM_TOLERANCE = 1e-6
+SPLICE_TOLERANCE = 1e-6
 """Points of an old motion this close to the start of the next one give way to its first [s]."""
 
 
@@ -50,11 +50,11 @@ class Motion:
     planned_at
         Absolute time at which it was accepted [s].
     cut
-        Absolute time at which another motion takes over [s]; None if none does.
-    stops
+        Absolute time at which another motion is spliced on [s]; None if none does.
+    is_stop
         Whether it brings a motion of the same number to rest early.
-    duration_min
-        Shortest duration within the limits, where it was looked for [s].
+    is_shortest
+        Whether its duration is the shortest within the limits, which was looked for.
     exceeded
         What the prescribed duration would have exceeded, if the motion was stretched.
     replaced_strategy
@@ -68,8 +68,8 @@ class Motion:
     start: float
     planned_at: float
     cut: float | None = None
-    stops: bool = False
-    duration_min: float | None = None
+    is_stop: bool = False
+    is_shortest: bool = False
     exceeded: LimitUse | None = None
     replaced_strategy: Strategy | None = None
 
@@ -112,7 +112,7 @@ class Track:
 
 class Timeline:
     """
-    Motions in the order of time, each until its own end or until the next one takes over.
+    Motions in the order of time, each until its own end or until the next one is spliced on.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ class Timeline:
         started = [motion for motion in self.motions if motion.start <= time]
         return started[-1] if started else next(iter(self.motions), None)
 
-    def seam(self, time: float) -> float:
-        """Return the first time from a given one on at which another motion may take over."""
+    def splice_time(self, time: float) -> float:
+        """Return the first time from a given one on at which another motion may be spliced on."""
         motion = self.at(time)
         if motion is None or not motion.start < time < motion.end:
             return time
@@ -185,7 +185,7 @@ class Timeline:
         start = first.start + origin
         pieces = []
         for motion, after in zip(left, [*left[1:], None], strict=True):
-            until = np.inf if after is None else after.start - SEAM_TOLERANCE - motion.start
+            until = np.inf if after is None else after.start - SPLICE_TOLERANCE - motion.start
             end = int(np.searchsorted(motion.samples.times, until))
             pieces.append((motion.samples, slice(max(begun, 0) if motion is first else 0, end)))
         shifts = [-origin, *(motion.start - start for motion in left[1:])]

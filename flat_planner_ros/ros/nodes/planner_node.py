@@ -175,7 +175,7 @@ class PlannerNode(Node):
 
     def _report_ended(self) -> None:
         """Publish how motions have ended."""
-        for ended in self._session.ended(self._now()):
+        for ended in self._session.take_ended(self._now()):
             self._publish_status(diagnostics.ended_status(ended))
 
     def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:

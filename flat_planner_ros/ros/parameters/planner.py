@@ -179,7 +179,7 @@ ROWS = [
     ),
     Row(
         'start.joint_state_timeout',
-        SessionSettings.measurement_timeout,
+        SessionSettings.joint_state_timeout,
         's',
         'age from which a joint state is stale',
         lower=0.0,
@@ -303,7 +303,7 @@ def build(values: Values) -> PlannerSettings:
         start_position=tuple(values.get('start.position', ())),
         position_tolerance=values['start.position_tolerance'],
         velocity_tolerance=values['start.velocity_tolerance'],
-        measurement_timeout=values['start.joint_state_timeout'],
+        joint_state_timeout=values['start.joint_state_timeout'],
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
         replan_tolerance=values['replan.tolerance'],

@@ -116,7 +116,7 @@ def accepted_status(
     )
     values: dict[str, float | int | str | None] = {
         **_motion_values(motion, 'ACCEPTED'),
-        'duration_min': motion.duration_min,
+        'duration_min': plan.duration if motion.is_shortest else None,
         'planning_time': planning_time,
         'boundary_residual': plan.boundary_residual,
         'optimality_residual': plan.optimality_residual,

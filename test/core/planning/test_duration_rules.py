@@ -53,7 +53,7 @@ LOADED = PlanarArm.reduced(
 """An arm whose weight the limits may not allow to be held or lifted."""
 
 
-def timing(limits, on_violation=OnViolation.REJECT, joints=('shoulder', 'elbow'), **changes):
+def rules_of(limits, on_violation=OnViolation.REJECT, joints=('shoulder', 'elbow'), **changes):
     """Return rules."""
     return DurationRules(
         joints=joints,
@@ -79,16 +79,16 @@ def peak_effort(planned):
 
 
 def test_a_duration_that_obeys_is_kept(paper_arm):
-    timed = timing(JointLimits.of(2, effort=[EFFORT, inf])).timed(half_turn(paper_arm), 1.1)
-    assert timed.plan.duration == 1.1
-    assert timed.duration_min is None
-    assert timed.exceeded is None
+    rules = rules_of(JointLimits.of(2, effort=[EFFORT, inf]))
+    found, exceeded = rules.plan_within(half_turn(paper_arm), 1.1)
+    assert found.duration == 1.1
+    assert exceeded is None
 
 
 def test_a_duration_too_short_is_refused_with_the_joint_and_all_numbers(paper_arm):
-    rules = timing(JointLimits.of(2, effort=[EFFORT, inf], velocity=[50.0, inf]))
+    rules = rules_of(JointLimits.of(2, effort=[EFFORT, inf], velocity=[50.0, inf]))
     with pytest.raises(RequestRejected) as refusal:
-        rules.timed(half_turn(paper_arm), 0.8)
+        rules.plan_within(half_turn(paper_arm), 0.8)
     error = refusal.value
     tight = half_turn(paper_arm)(0.8)
     assert error.reason is Reason.EFFORT_LIMIT
@@ -101,23 +101,23 @@ def test_a_duration_too_short_is_refused_with_the_joint_and_all_numbers(paper_ar
         assert number in str(error)
     # The text is the number, and the number obeys.
     again = float(f'{error.duration_min:.9g}')
-    assert rules.timed(half_turn(paper_arm), again).plan.duration == again
+    assert rules.plan_within(half_turn(paper_arm), again)[0].duration == again
 
 
 def test_a_velocity_is_told_from_an_effort(paper_arm):
-    rules = timing(JointLimits.of(2, effort=[1.0, inf], velocity=[6.0, inf]))
+    rules = rules_of(JointLimits.of(2, effort=[1.0, inf], velocity=[6.0, inf]))
     with pytest.raises(RequestRejected) as refusal:
-        rules.timed(half_turn(paper_arm), 0.8)
+        rules.plan_within(half_turn(paper_arm), 0.8)
     assert refusal.value.reason is Reason.VELOCITY_LIMIT
     assert 'rad/s' in str(refusal.value)
 
 
 def test_a_duration_too_short_is_stretched_on_request(paper_arm):
-    rules = timing(JointLimits.of(2, effort=[EFFORT, inf]), OnViolation.SCALE)
-    timed = rules.timed(half_turn(paper_arm), 0.8)
-    assert timed.plan.duration == timed.duration_min == pytest.approx(1.00410, rel=1e-3)
-    assert peak_effort(timed.plan) <= EFFORT
-    assert abs(timed.exceeded.value) == pytest.approx(peak_effort(half_turn(paper_arm)(0.8)))
+    rules = rules_of(JointLimits.of(2, effort=[EFFORT, inf]), OnViolation.SCALE)
+    found, exceeded = rules.plan_within(half_turn(paper_arm), 0.8)
+    assert found.duration == pytest.approx(1.00410, rel=1e-3)
+    assert peak_effort(found) <= EFFORT
+    assert abs(exceeded.value) == pytest.approx(peak_effort(half_turn(paper_arm)(0.8)))
 
 
 def test_to_stretch_is_not_to_shorten():
@@ -129,11 +129,11 @@ def test_to_stretch_is_not_to_shorten():
     limits = JointLimits.of(3, effort=[5.6, inf, inf])
     joints = ('a', 'b', 'c')
     with pytest.raises(RequestRejected) as stretched:
-        timing(limits, OnViolation.SCALE, joints).timed(lift, 5.0)
+        rules_of(limits, OnViolation.SCALE, joints).plan_within(lift, 5.0)
     assert stretched.value.duration_min is None
     assert 'no duration from 5 to 600 s' in str(stretched.value)
     with pytest.raises(RequestRejected) as refused:
-        timing(limits, OnViolation.REJECT, joints).timed(lift, 5.0)
+        rules_of(limits, OnViolation.REJECT, joints).plan_within(lift, 5.0)
     assert 1.0 < refused.value.duration_min < 2.0
     assert refused.value.reason is Reason.EFFORT_LIMIT
 
@@ -146,15 +146,15 @@ def test_a_static_load_is_named_as_such():
     words = 'the effort of a at rest in the final pose is 5.886 N m'
     for duration in (None, 2.0):
         with pytest.raises(RequestRejected, match=words) as refusal:
-            timing(JointLimits.of(3, effort=[3.0, inf, inf]), joints=('a', 'b', 'c')).timed(
-                lower, duration
-            )
+            rules_of(
+                JointLimits.of(3, effort=[3.0, inf, inf]), joints=('a', 'b', 'c')
+            ).plan_within(lower, duration)
         assert refusal.value.reason is Reason.EFFORT_LIMIT
         assert refusal.value.value == pytest.approx(5.886, rel=1e-3)
 
 
 def test_poses_outside_the_range_are_refused_and_named():
-    rules = timing(JointLimits.of(2, position_max=[3.0, inf]))
+    rules = rules_of(JointLimits.of(2, position_max=[3.0, inf]))
     rules.check_pose('the final', np.array([3.0, 0.0]))
     with pytest.raises(RequestRejected, match='the final position 3.1 rad of shoulder') as refusal:
         rules.check_pose('the final', np.array([3.1, 0.0]))
@@ -192,7 +192,7 @@ def goal(angle=pi, time=0.0):
 def test_a_session_finds_the_duration_of_goals_without_one(paper_arm):
     limits = JointLimits.of(2, effort=[EFFORT, inf])
     motion = session(paper_arm, limits=limits).submit(goal(), 10.0)
-    assert motion.duration_min == motion.plan.duration
+    assert motion.is_shortest
     assert motion.plan.duration == pytest.approx(1.00410, rel=1e-3)
     assert np.abs(motion.samples.efforts).max() <= EFFORT
     quick = session(paper_arm, limits=limits, min_duration=1.5).submit(goal(), 10.0)
@@ -239,7 +239,7 @@ def test_a_goal_in_motion_obeys_the_limits_too(paper_arm):
     first = moving.submit(goal(time=2.0), 10.0)
     second = moving.submit(goal(-1.0), 10.4)
     assert second.plan.request.start_jets is not None
-    assert second.duration_min == second.plan.duration
+    assert second.is_shortest
     times = np.linspace(0.0, second.plan.duration, 20_001)
     assert np.abs(second.plan.at(times).efforts).max() <= EFFORT * (1.0 + 1e-9)
     assert second.start < first.start + first.plan.duration

@@ -281,7 +281,7 @@ def test_without_limits_everything_obeys(paper_arm):
     limits = JointLimits.of(2)
     assert limits.worst(half_turn(paper_arm, 0.05)) is None
     assert limits.quantities == ()
-    assert not limits.bound_duration
+    assert not limits.bounds_duration
 
 
 def test_a_pose_outside_the_range_is_told_by_joint_and_side():

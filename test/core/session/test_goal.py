@@ -19,7 +19,13 @@ from itertools import pairwise
 from math import inf, nan, pi
 
 from flat_planner_ros.core.planning.request import Reason, RequestRejected
-from flat_planner_ros.core.session.goal import Goal, GoalPoint, MAX_ANGLE, MAX_POINTS, rest_target
+from flat_planner_ros.core.session.goal import (
+    checked_goal,
+    Goal,
+    GoalPoint,
+    MAX_ANGLE,
+    MAX_POINTS,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -37,12 +43,19 @@ def with_point(**changes: object) -> Goal:
 def rejection(goal: Goal) -> RequestRejected:
     """Return how a goal is refused."""
     with pytest.raises(RequestRejected) as caught:
-        rest_target(goal, JOINTS)
+        checked_goal(goal, JOINTS)
     return caught.value
 
 
+def points_of(goal: Goal) -> tuple[tuple[tuple[float, ...], float], ...]:
+    """Return positions of all joints and time of every point of an admissible goal."""
+    checked = checked_goal(goal, JOINTS)
+    assert checked.joint_names == JOINTS
+    return tuple((point.positions, point.time) for point in checked.points)
+
+
 def test_the_passive_joint_may_be_left_out():
-    assert rest_target(GOAL, JOINTS) == ((pi, 0.0), 1.0, ())
+    assert points_of(GOAL) == (((pi, 0.0), 1.0),)
 
 
 def test_joints_may_come_in_any_order():
@@ -50,16 +63,16 @@ def test_joints_may_come_in_any_order():
         joint_names=('elastic', 'shoulder'),
         points=(GoalPoint(time=2.0, positions=(0.0, -1.0)),),
     )
-    assert rest_target(goal, JOINTS) == ((-1.0, 0.0), 2.0, ())
+    assert points_of(goal) == (((-1.0, 0.0), 2.0),)
 
 
 def test_time_zero_leaves_the_duration_open():
-    assert rest_target(with_point(time=0.0), JOINTS).duration is None
+    assert checked_goal(with_point(time=0.0), JOINTS).duration is None
 
 
 def test_zero_end_velocities_and_accelerations_are_allowed():
     goal = with_point(velocities=(0.0,), accelerations=(-0.0,))
-    assert rest_target(goal, JOINTS).positions == (pi, 0.0)
+    assert checked_goal(goal, JOINTS).points[-1].positions == (pi, 0.0)
 
 
 def test_via_points_are_read_in_kinematic_order():
@@ -68,16 +81,17 @@ def test_via_points_are_read_in_kinematic_order():
         GoalPoint(time=2.0, positions=(0.0, -1.0)),
     )
     goal = Goal(joint_names=('elastic', 'shoulder'), points=points)
-    assert rest_target(goal, JOINTS).via == (((0.7, 0.0), 0.5),)
+    assert points_of(goal) == (((0.7, 0.0), 0.5), ((-1.0, 0.0), 2.0))
     without = replace(goal, points=tuple(replace(point, time=0.0) for point in points))
-    assert rest_target(without, JOINTS) == ((-1.0, 0.0), None, (((0.7, 0.0), None),))
+    assert points_of(without) == (((0.7, 0.0), 0.0), ((-1.0, 0.0), 0.0))
+    assert checked_goal(without, JOINTS).duration is None
 
 
 def test_the_largest_goal_is_admitted():
     points = tuple(GoalPoint(time=0.1 * i, positions=(i,)) for i in range(1, MAX_POINTS + 1))
-    target = rest_target(replace(GOAL, points=points), JOINTS)
-    assert len(target.via) == MAX_POINTS - 1
-    assert target.via[-1].time < target.duration == points[-1].time
+    target = checked_goal(replace(GOAL, points=points), JOINTS)
+    assert len(target.points) == MAX_POINTS
+    assert target.points[-2].time < target.duration == points[-1].time
 
 
 BROKEN = {
@@ -238,14 +252,14 @@ names = st.lists(st.sampled_from(['shoulder', 'elastic', 'knee', '']), max_size=
 def test_a_goal_is_either_admissible_or_refused(joint_names, goal_points):
     goal = Goal(joint_names=joint_names, points=goal_points)
     try:
-        target = rest_target(goal, JOINTS)
+        target = checked_goal(goal, JOINTS)
     except RequestRejected:
         return
-    assert target.positions[-1] == 0.0
-    assert abs(target.positions[0]) <= MAX_ANGLE
+    assert all(point.positions[-1] == 0.0 for point in target.points)
+    assert all(abs(point.positions[0]) <= MAX_ANGLE for point in target.points)
     assert target.duration is None or target.duration > 0.0
-    times = [point.time for point in target.via]
+    times = [point.time for point in target.points]
     if target.duration is None:
-        assert set(times) <= {None}
+        assert set(times) == {0.0}
     else:
-        assert all(a < b for a, b in pairwise([0.0, *times, target.duration]))
+        assert all(a < b for a, b in pairwise([0.0, *times]))

@@ -124,7 +124,8 @@ def test_via_points_keep_their_shares_of_the_shortest_duration():
     assert shares == pytest.approx([0.4 / 1.5, 0.9 / 1.5])
     points = tuple(replace(point, time=0.0) for point in VIA.points)
     chosen = session(limits=limits).submit(replace(VIA, points=points), NOW)
-    assert chosen.plan.duration == chosen.duration_min < scaled.plan.duration
+    assert chosen.is_shortest
+    assert chosen.plan.duration < scaled.plan.duration
     assert chosen.plan.peak_velocity[0] == pytest.approx(2.5, rel=3e-3)
     times = np.array([point.time for point in chosen.plan.request.via])
     passed = chosen.plan.at(times).positions.sum(axis=1)
@@ -214,9 +215,9 @@ def test_a_duration_outside_the_range_is_refused(time, limit):
 def test_a_motion_ends_once():
     planner = session()
     motion = planner.submit(GOAL, NOW)
-    assert planner.ended(motion.end - 0.01) == []
-    assert planner.ended(motion.end) == [(motion, Outcome.FINISHED)]
-    assert planner.ended(motion.end + 1.0) == []
+    assert planner.take_ended(motion.end - 0.01) == []
+    assert planner.take_ended(motion.end) == [(motion, Outcome.FINISHED)]
+    assert planner.take_ended(motion.end + 1.0) == []
 
 
 def test_a_goal_in_motion_takes_over_without_a_step():
@@ -232,8 +233,8 @@ def test_a_goal_in_motion_takes_over_without_a_step():
         scale = np.abs(getattr(first.samples, quantity)).max()
         assert after == pytest.approx(before, abs=1e-9 * scale)
     assert second.samples.positions[-1].tolist() == [0.0, 0.0]
-    assert planner.ended(now) == [(first, Outcome.PREEMPTED)]
-    assert planner.ended(second.end) == [(second, Outcome.FINISHED)]
+    assert planner.take_ended(now) == [(first, Outcome.PREEMPTED)]
+    assert planner.take_ended(second.end) == [(second, Outcome.FINISHED)]
 
 
 def test_no_motion_takes_over_from_one_that_the_arm_does_not_carry_out():
@@ -260,7 +261,7 @@ def test_no_motion_takes_over_from_one_that_the_arm_does_not_carry_out():
 
 @pytest.mark.parametrize(
     ('changes', 'age'),
-    [({'replan_tolerance': 0.0}, 0.01), ({}, 0.501), ({'measurement_timeout': 2.0}, 0.95)],
+    [({'replan_tolerance': 0.0}, 0.01), ({}, 0.501), ({'joint_state_timeout': 2.0}, 0.95)],
 )
 def test_only_a_fresh_state_of_its_time_tells_that_the_arm_is_elsewhere(changes, age):
     planner = session(**changes)
@@ -275,7 +276,7 @@ def test_a_stop_is_planned_wherever_the_arm_is():
     first = planner.submit(GOAL, NOW)
     now = first.start + 0.5
     planner.measure(sample(position=(-3.0, 0.0), time=now))
-    assert planner.stop(now).stops
+    assert planner.stop(now).is_stop
 
 
 def test_two_goals_within_a_period_of_the_command_take_over_at_the_same_time():
@@ -337,8 +338,8 @@ def test_goals_queue_by_their_stamps():
     assert track.start + track.times[-1] == pytest.approx(third.end)
     assert (np.diff(track.times) > 0.0).all()
     assert planner.reference(first.end + 0.25).positions[0].tolist() == [pi, 0.0]
-    assert planner.ended(first.end + 0.25) == [(first, Outcome.FINISHED)]
-    assert planner.ended(third.end) == [(second, Outcome.FINISHED), (third, Outcome.FINISHED)]
+    assert planner.take_ended(first.end + 0.25) == [(first, Outcome.FINISHED)]
+    assert planner.take_ended(third.end) == [(second, Outcome.FINISHED), (third, Outcome.FINISHED)]
 
 
 def test_a_goal_replaces_all_that_was_planned_from_its_start_on():
@@ -348,7 +349,7 @@ def test_a_goal_replaces_all_that_was_planned_from_its_start_on():
     third = planner.submit(replace(BACK, stamp=second.end + 0.5), NOW)
     now = first.end + 0.1
     last = planner.submit(replace(GOAL, stamp=second.start + 0.3), now)
-    assert planner.ended(now) == [
+    assert planner.take_ended(now) == [
         (first, Outcome.FINISHED),
         (second, Outcome.PREEMPTED),
         (third, Outcome.PREEMPTED),
@@ -362,7 +363,7 @@ def test_a_motion_that_waits_for_its_start_gives_way():
     second = planner.submit(GOAL, NOW + 1.0)
     assert second.start == pytest.approx(NOW + 1.0 + SETTINGS.lookahead)
     assert second.samples.positions[0].tolist() == [0.5, 0.0]
-    assert planner.ended(NOW + 1.0) == [(first, Outcome.PREEMPTED)]
+    assert planner.take_ended(NOW + 1.0) == [(first, Outcome.PREEMPTED)]
 
 
 def test_commands_without_a_stamp_cannot_be_spliced():
@@ -382,7 +383,7 @@ def test_planning_that_takes_too_long_leaves_the_motion_alone():
     error = reason_of(planner.submit, BACK, now, lambda: now + 0.09)
     assert error.reason is Reason.BUSY
     assert planner.motion is first
-    assert planner.ended(now) == []
+    assert planner.take_ended(now) == []
     assert (planner.track(now).efforts == track.efforts).all()
     assert planner.submit(BACK, now, lambda: now + 0.05).plan_id == 2
 
@@ -400,7 +401,7 @@ def test_a_stop_comes_to_rest_early_with_bounded_effort(elapsed):
     assert track.positions[-1, 1] == 0.0
     peak = np.abs(first.samples.efforts).max()
     assert np.abs(stop.samples.efforts).max() <= 2.0 * peak
-    assert planner.ended(stop.end) == [(stop, Outcome.STOPPED)]
+    assert planner.take_ended(stop.end) == [(stop, Outcome.STOPPED)]
 
 
 def test_a_stop_of_a_motion_that_waits_stays_at_the_start():
@@ -409,7 +410,7 @@ def test_a_stop_of_a_motion_that_waits_stays_at_the_start():
     stop = planner.stop(NOW + 1.0)
     assert (stop.samples.positions == [0.5, 0.0]).all()
     assert not stop.samples.efforts.any()
-    assert planner.ended(stop.end) == [(stop, Outcome.STOPPED)]
+    assert planner.take_ended(stop.end) == [(stop, Outcome.STOPPED)]
 
 
 def test_a_stop_may_be_overtaken_by_a_goal():
@@ -417,8 +418,8 @@ def test_a_stop_may_be_overtaken_by_a_goal():
     first = planner.submit(GOAL, NOW)
     stop = planner.stop(first.start + 0.3)
     second = planner.submit(BACK, first.start + 0.35)
-    assert planner.ended(first.start + 0.35) == [(stop, Outcome.PREEMPTED)]
-    assert planner.ended(second.end) == [(second, Outcome.FINISHED)]
+    assert planner.take_ended(first.start + 0.35) == [(stop, Outcome.PREEMPTED)]
+    assert planner.take_ended(second.end) == [(second, Outcome.FINISHED)]
 
 
 def test_there_is_nothing_to_stop_at_rest():
@@ -448,7 +449,7 @@ def test_a_chain_of_goals_leaves_no_more_than_one(seed):
         now += random.uniform(0.05, 0.9)
         point = GoalPoint(time=random.uniform(0.7, 1.5), positions=(random.uniform(-pi, pi),))
         planner.submit(replace(GOAL, points=(point,)), now)
-        planner.ended(now)
+        planner.take_ended(now)
         tracks.append(planner.track(now))
     assert residual(spliced(tracks), SETTINGS.arm) < 1e-5
 
@@ -481,7 +482,7 @@ def test_plans_that_are_not_executed_keep_nothing_busy():
     planner = session(execute=False)
     first = planner.submit(GOAL, NOW)
     assert planner.submit(GOAL, NOW).plan_id == first.plan_id + 1
-    assert planner.ended(first.end) == []
+    assert planner.take_ended(first.end) == []
     assert planner.track(NOW).times[-1] == 1.0
 
 
@@ -512,7 +513,7 @@ def test_an_old_measurement_is_stale():
     error = reason_of(session().submit, GOAL, NOW + 0.6)
     assert error.reason is Reason.START_STATE_STALE
     assert error.value == pytest.approx(0.6)
-    assert error.limit == SETTINGS.measurement_timeout
+    assert error.limit == SETTINGS.joint_state_timeout
 
 
 def test_a_measurement_by_another_clock_is_no_start():

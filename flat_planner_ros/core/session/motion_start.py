@@ -1,0 +1,252 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Start of a motion: at rest, or in the midst of another motion, spliced to it without a step."""
+
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import FloatArray, JointSample
+from flat_planner_ros.core.planning import CONDITIONS, Reason, RequestRejected
+from flat_planner_ros.core.session.settings import SessionSettings, StartSource
+from flat_planner_ros.core.session.timeline import Motion, Timeline
+import numpy as np
+
+
+class MotionStart(NamedTuple):
+    """
+    Where a motion starts.
+
+    Attributes
+    ----------
+    time
+        Absolute [s].
+    pose
+        Angles of all joints, shape (n,) [rad].
+    jets
+        Derivatives 0 to 5 of the planned variables where the arm is planned to move then, shape
+        (n - 1, 6) [rad/s^k]; None at rest.
+    running
+        The motion in force then, if one is.
+
+    """
+
+    time: float
+    pose: FloatArray
+    jets: FloatArray | None = None
+    running: Motion | None = None
+
+
+def pose_at_rest(
+    settings: SessionSettings,
+    measured: JointSample | None,
+    reference: FloatArray | None,
+    now: float,
+) -> FloatArray:
+    """
+    Return where a motion from rest starts, checked against what is measured.
+
+    Parameters
+    ----------
+    settings
+        Source of the start, and its tolerances.
+    measured
+        Last measured state, None before the first.
+    reference
+        Angles at the end of the last motion, shape (n,) [rad]; None if there has been none.
+    now
+        Present time [s].
+
+    Returns
+    -------
+    FloatArray
+        Angles of all joints, the passive one relaxed, shape (n,) [rad].
+
+    Raises
+    ------
+    RequestRejected
+        The start is not known, or the arm does not rest there.
+
+    """
+    timeout = settings.joint_state_timeout
+    if settings.start_source in (StartSource.AUTO, StartSource.MEASURED):
+        measured = _fresh(measured, timeout, now)
+        pose = np.append(measured.positions[:-1], 0.0)
+    else:
+        if settings.start_source is StartSource.PARAMETER:
+            pose = np.array(settings.start_position)
+        elif reference is not None:
+            pose = reference
+        else:
+            raise RequestRejected(
+                Reason.START_STATE_UNKNOWN,
+                'start.source is reference, but there has been no motion yet',
+            )
+        if measured is None:
+            return pose
+        measured = _fresh(measured, timeout, now)
+    _check_at_rest(settings, measured, pose)
+    return pose
+
+
+def splice(timeline: Timeline, stamp: float | None, soonest: float) -> MotionStart:
+    """
+    Return the start of a motion that takes over from what is planned.
+
+    Parameters
+    ----------
+    timeline
+        Busy: a motion is under way or waits for its start.
+    stamp
+        Absolute time at which it is to start [s]; None for as soon as possible.
+    soonest
+        Earliest time at which it can take over from a moving arm [s].
+
+    Raises
+    ------
+    RequestRejected
+        The arm moves then, and it is too soon.
+
+    """
+    time = timeline.splice_time(soonest) if stamp is None else stamp
+    running = timeline.at(time)
+    if running is None:  # is_busy says otherwise
+        raise RequestRejected(Reason.INTERNAL, 'there is no motion to start from')
+    elapsed = time - running.start
+    request = running.plan.request
+    if elapsed < 0.0 or (elapsed == 0.0 and request.start_jets is None):
+        return MotionStart(time, request.start, running=running)
+    if time >= running.end:
+        return MotionStart(time, request.final, running=running)
+    if time < soonest:
+        raise RequestRejected(
+            Reason.OLD_HEADER_TIMESTAMP,
+            f'motion {running.plan_id} is under way: another one can take over from '
+            f'{soonest:.3f} s on (replan.lookahead), not at {time:.3f} s',
+            value=time,
+            limit=soonest,
+        )
+    if elapsed == 0.0:
+        # Two goals within one period of the command: the later one takes its place.
+        return MotionStart(time, request.start, request.start_jets, running)
+    samples = running.reference(time)
+    return MotionStart(time, samples.positions[0], samples.planned[:, :CONDITIONS, 0], running)
+
+
+def check_carried_out(
+    settings: SessionSettings, timeline: Timeline, measured: JointSample | None, now: float
+) -> None:
+    """
+    Refuse a splice while the arm is far from what it is planned to do.
+
+    Its executor has then lost the motion, restarted perhaps, and would refuse what continues it.
+    Without a fresh measured state there is nothing to compare.
+
+    Parameters
+    ----------
+    settings
+        With the tolerance.
+    timeline
+        What is planned.
+    measured
+        Last measured state, None before the first.
+    now
+        Present time [s].
+
+    Raises
+    ------
+    RequestRejected
+        An actuated joint is beyond the tolerance.
+
+    """
+    limit = settings.replan_tolerance
+    if limit == 0.0 or measured is None:
+        return
+    motion = timeline.at(measured.time)
+    is_fresh = abs(now - measured.time) <= settings.joint_state_timeout
+    # What was planned before the first motion left is not known any more.
+    if not is_fresh or motion is None or measured.time < motion.start:
+        return
+    planned = motion.reference(measured.time).positions[0]
+    actuated = zip(settings.joints[:-1], measured.positions, planned, strict=False)
+    for name, position, reference in actuated:
+        if abs(position - reference) > limit:
+            raise RequestRejected(
+                Reason.START_STATE_MISMATCH,
+                f'{name} is measured at {position:.4g} rad, but motion {motion.plan_id} is then '
+                f'at {reference:.4g} rad (replan.tolerance {limit:g} rad): the arm does not carry '
+                f'it out, call ~/stop or wait for its end at {motion.end:.3f} s',
+                joint=name,
+                value=float(position),
+                limit=limit,
+            )
+
+
+def check_stamp(stamp: float | None, now: float) -> None:
+    """Refuse a start in the past [s]."""
+    if stamp is not None and stamp < now:
+        raise RequestRejected(
+            Reason.OLD_HEADER_TIMESTAMP,
+            f'the stamp {stamp:.3f} s lies {now - stamp:.3f} s in the past; 0 means as soon as '
+            f'possible',
+            value=stamp,
+            limit=now,
+        )
+
+
+def _fresh(measured: JointSample | None, limit: float, now: float) -> JointSample:
+    """Return the measured state unless there is none, or only an old one."""
+    if measured is None:
+        raise RequestRejected(
+            Reason.START_STATE_UNKNOWN, 'no joint state of this arm has been received yet'
+        )
+    age = now - measured.time
+    if not -limit <= age <= limit:
+        raise RequestRejected(
+            Reason.START_STATE_STALE,
+            f'the last joint state is {age:.3f} s old, more than {limit:g} s'
+            if age > 0.0
+            else f'the last joint state is stamped {-age:.3f} s ahead of the present: do the '
+            f'planner and its source go by the same clock (use_sim_time)?',
+            value=age,
+            limit=limit,
+        )
+    return measured
+
+
+def _check_at_rest(settings: SessionSettings, measured: JointSample, planned: FloatArray) -> None:
+    """Refuse to start from another place, or while the arm still moves."""
+    nothing = np.full(len(planned), np.nan)
+    velocities = nothing if measured.velocities is None else measured.velocities
+    for name, position, velocity, start in zip(
+        settings.joints, measured.positions, velocities, planned, strict=True
+    ):
+        # Written so that a NaN position is refused and a NaN velocity is not.
+        if not abs(position - start) <= settings.position_tolerance:
+            raise RequestRejected(
+                Reason.START_STATE_MISMATCH,
+                f'{name} is measured at {position:.4g} rad, not at the start {start:.4g} rad '
+                f'(tolerance {settings.position_tolerance:g} rad)',
+                joint=name,
+                value=float(position),
+                limit=settings.position_tolerance,
+            )
+        if abs(velocity) > settings.velocity_tolerance:
+            raise RequestRejected(
+                Reason.NOT_AT_REST,
+                f'{name} moves at {velocity:.4g} rad/s, more than '
+                f'{settings.velocity_tolerance:g} rad/s',
+                joint=name,
+                value=float(velocity),
+                limit=settings.velocity_tolerance,
+            )
