@@ -144,11 +144,10 @@ def test_a_static_load_is_named_as_such():
         return plan(request, LOADED, PlanningOptions())
 
     words = 'the effort of a at rest in the final pose is 5.886 N m'
+    rules = rules_of(JointLimits.of(3, effort=[3.0, inf, inf]), joints=('a', 'b', 'c'))
     for duration in (None, 2.0):
         with pytest.raises(RequestRejected, match=words) as refusal:
-            rules_of(
-                JointLimits.of(3, effort=[3.0, inf, inf]), joints=('a', 'b', 'c')
-            ).plan_within(lower, duration)
+            rules.plan_within(lower, duration)
         assert refusal.value.reason is Reason.EFFORT_LIMIT
         assert refusal.value.value == pytest.approx(5.886, rel=1e-3)
 
