@@ -42,6 +42,7 @@ WINGS = {
     'session': 'planning arm',
     'plant': 'arm',
     'monitor': 'arm',
+    'tracking': 'arm',
 }
 """The wings of the core, each with the others from whose public lists it may import."""
 

@@ -30,6 +30,7 @@ from flat_planner_ros.core.arm.errors import (
     NotFlat,
     OutOfReach,
     strict_arithmetic,
+    UncertifiedLoop,
     UncertifiedPlan,
 )
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
@@ -74,6 +75,7 @@ __all__ = [
     'remedy',
     'SampledMotion',
     'strict_arithmetic',
+    'UncertifiedLoop',
     'UncertifiedPlan',
     'urdf_of',
     'UrdfLimits',

@@ -95,6 +95,39 @@ class UncertifiedPlan(FlatPlannerError):
         self.tolerance = tolerance
 
 
+class UncertifiedLoop(FlatPlannerError):
+    """
+    A feedback loop is not stable enough for every arm that it may meet.
+
+    Attributes
+    ----------
+    margin, bound
+        Least distance of its frequency response from -1, 0 if it is unstable, and the least one
+        allowed [-].
+    decay_rate
+        At which its slowest deviation dies away, negative if it grows [1/s].
+    factors
+        On stiffness, damping and inertia of the worst arm [-].
+
+    """
+
+    def __init__(
+        self, margin: float, bound: float, decay_rate: float, factors: tuple[float, float, float]
+    ) -> None:
+        """Keep the numbers, so that a caller can report them."""
+        k, c, inertia = factors
+        found = f'its margin is {margin:.3g}' if decay_rate > 0.0 else 'it is unstable'
+        super().__init__(
+            f'loop refused: with stiffness, damping and inertia times {k:g}, {c:g} and '
+            f'{inertia:g} {found} (slowest decay {decay_rate:.3g} 1/s), at least {bound:g} is '
+            'asked for; lower bandwidth, delay or uncertainty, or raise rate'
+        )
+        self.margin = margin
+        self.bound = bound
+        self.decay_rate = decay_rate
+        self.factors = factors
+
+
 class InvalidCommand(FlatPlannerError):
     """The commanded trajectory cannot be played."""
 

@@ -1,0 +1,237 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Tracking without ROS: efforts from joint samples, and the rules by which it gives up.
+
+It is idle until its first command. What it does not understand ends in efforts that go to zero
+along a straight line in time, one reason, and idleness until the next command.
+"""
+
+from enum import Enum
+from math import inf
+
+from flat_planner_ros.core.arm import FloatArray, InvalidCommand, JointSample, PlanarArm
+from flat_planner_ros.core.tracking.arm_observer import Estimate
+from flat_planner_ros.core.tracking.certificate import certify
+from flat_planner_ros.core.tracking.planned_motion import PlannedMotion
+from flat_planner_ros.core.tracking.settings import TrackerSettings
+from flat_planner_ros.core.tracking.state_feedback import distance, StateFeedback
+import numpy as np
+
+EARLY = 0.5
+"""Share of a period after an effort in which no other one is sent [-]."""
+
+
+class Phase(Enum):
+    """What the tracker does."""
+
+    IDLE = 'idle'
+    """Nothing: it listens."""
+
+    TRACKING = 'tracking'
+    """It follows a motion, or holds its end."""
+
+    RELEASING = 'releasing'
+    """The effort goes to zero."""
+
+
+class Tracker:
+    """
+    State feedback around planned motions.
+
+    Times are absolute, in seconds, and given by the caller; samples carry their own.
+
+    Parameters
+    ----------
+    arm
+        The model; must be flat.
+    settings
+        The loop, its bandwidths, and when it gives up.
+
+    Raises
+    ------
+    UncertifiedLoop
+        The loop would not be stable enough for all arms of the box of uncertainty.
+    NotFlat, InvalidRequest
+        There is no such loop.
+
+    """
+
+    def __init__(self, arm: PlanarArm, settings: TrackerSettings) -> None:
+        """Compute and certify the gains; be idle."""
+        self.certificate = certify(arm, settings)
+        self._settings, self._joints = settings, arm.n
+        self._feedback = StateFeedback(arm, settings)
+        self._observer = self._feedback.observer
+        self._motion: PlannedMotion | None = None
+        self._next: PlannedMotion | None = None
+        self._heard, self._sent = -inf, -inf
+        self._efforts = self._last = np.zeros(arm.n - 1)
+        self._released = -inf
+        self._clipped_since = inf
+        self._fault, self.error = '', 0.0
+        self.phase = Phase.IDLE
+
+    def follow(self, motion: PlannedMotion, now: float) -> None:
+        """
+        Follow a motion from its start on, in the place of the present one.
+
+        Raises
+        ------
+        InvalidCommand
+            It is another arm's, over, or nobody knows where the arm is; the present one goes on.
+
+        """
+        if motion.joints != self._joints:
+            raise InvalidCommand(
+                f'the arm has {self._joints} joints, the motion {motion.joints}: tracking needs '
+                'the passive joint too'
+            )
+        if motion.end <= now:
+            raise InvalidCommand(f'the motion ended {now - motion.end:.3f} s ago')
+        if now - self._heard > self._settings.timeout:
+            raise InvalidCommand(
+                f'no joint sample for {now - self._heard:.3g} s, the timeout is '
+                f'{self._settings.timeout:g} s: the motion is not begun'
+            )
+        self._next = motion
+
+    def release(self, now: float, fault: str = '') -> None:
+        """Let the effort go to zero and be idle until the next command; for a fault, say why."""
+        if self.phase is Phase.TRACKING or self._next is not None:
+            self._fault = fault
+        self._motion = self._next = None
+        self._clipped_since = inf
+        if self.phase is Phase.TRACKING:
+            self.phase, self._released, self._last = Phase.RELEASING, now, self._efforts
+
+    def take_fault(self) -> str:
+        """Return why tracking was given up since this was last asked; nothing if it was not."""
+        fault, self._fault = self._fault, ''
+        return fault
+
+    def hear(self, sample: JointSample, now: float) -> FloatArray | None:
+        """
+        Take in a sample; return the efforts to apply.
+
+        Parameters
+        ----------
+        sample
+            Measured angles; velocities are used only where the estimate starts.
+        now
+            Present time [s].
+
+        Returns
+        -------
+        FloatArray | None
+            Shape (n-1,) [N m], to act the loop's delay from now on; None if nothing is to be sent.
+
+        """
+        if not np.isfinite(sample.positions).all():
+            self._give_up(now, f'a joint sample is not finite: {sample.positions.tolist()} rad')
+        elif sample.time > self._heard or sample.time < self._heard - self._settings.timeout:
+            self._measure(sample, now)
+        return self._act(now)
+
+    def watch(self, now: float) -> FloatArray | None:
+        """Return the efforts to apply if no sample has come lately, None if there are none."""
+        if now - self._heard <= self._settings.timeout and self.phase is not Phase.RELEASING:
+            return None
+        return self._act(now)
+
+    def state(self, time: float) -> Estimate:
+        """Return the estimate for a time [s]."""
+        return self._observer.predicted(time)
+
+    def _measure(self, sample: JointSample, now: float) -> None:
+        """Correct the estimate, or start it anew where it has nothing to do with the sample."""
+        limit, gap = self._settings.jump, sample.time - self._heard
+        self._heard = sample.time
+        if not 0.0 < gap <= self._settings.timeout:
+            self._give_up(now, f'no joint sample for {gap:.3g} s')
+            self._observer.restart(sample)
+            return
+        surprise = self._observer.correct(sample)
+        if surprise > limit:
+            self._give_up(
+                now,
+                f'a joint jumped by {surprise:.3g} rad, beyond {limit:g} rad',
+            )
+            self._observer.restart(sample)
+
+    def _act(self, now: float) -> FloatArray | None:
+        """Return the efforts of the present phase."""
+        silent = now - self._heard
+        if silent > self._settings.timeout:
+            self._give_up(now, f'the last joint sample is {silent:.3g} s old')
+        time = now + self._settings.delay
+        self._begin(time, now)
+        if self.phase is Phase.IDLE or now - self._sent < EARLY * self._settings.period:
+            return None
+        self._sent = now
+        if self.phase is Phase.TRACKING and self._motion is not None:
+            self._track(time, now, self._motion)
+        if self.phase is Phase.RELEASING:
+            self._fade(time, now)
+        return self._efforts
+
+    def _begin(self, time: float, now: float) -> None:
+        """Go over to the next motion where its time has come."""
+        if self._next is None or time < self._next.start:
+            return
+        if self.phase is not Phase.TRACKING:
+            limit = self._settings.jump
+            miss = distance(self._observer.predicted(time), self._next.at(time))
+            if miss > limit:
+                self._give_up(
+                    now,
+                    f'the motion begins {miss:.3g} rad from the arm, beyond {limit:g} rad',
+                )
+                return
+            self._observer.forget_disturbances()
+        self._motion, self._next = self._next, None
+        self.phase = Phase.TRACKING
+
+    def _track(self, time: float, now: float, motion: PlannedMotion) -> None:
+        """Compute the efforts of a motion, or find a reason to give it up."""
+        if time > motion.end and not self._settings.hold and self._next is None:
+            self.release(now)
+            return
+        command = self._feedback.command(time, motion)
+        self.error, limit = command.error, self._settings.max_error
+        self._clipped_since = min(self._clipped_since, now) if command.is_clipped else inf
+        clipped = now - self._clipped_since
+        if not command.error <= limit:
+            self._give_up(now, f'the arm is {command.error:.3g} rad from its plan')
+        elif clipped > self._settings.saturation_timeout:
+            self._give_up(now, f'an effort has been at its limit for {clipped:.3g} s')
+        else:
+            self._efforts = command.efforts
+
+    def _fade(self, time: float, now: float) -> None:
+        """Let the effort go to zero."""
+        left = max(0.0, self._released + self._settings.ramp - now)
+        if left == 0.0:
+            self._efforts = np.zeros(self._joints - 1)
+            self._observer.note(time, 0.0, np.zeros(self._joints - 2))
+            self.phase = Phase.IDLE
+            return
+        self._efforts = self._last * left / self._settings.ramp
+        self._observer.note_efforts(time, self._efforts)
+
+    def _give_up(self, now: float, reason: str) -> None:
+        """Release the arm for a reason, if it is held."""
+        ramp = self._settings.ramp
+        self.release(now, f'tracking given up: {reason}; the effort goes to zero in {ramp:g} s')
