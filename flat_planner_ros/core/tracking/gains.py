@@ -116,8 +116,8 @@ def observer_gain(chain: Chain, period: float, bandwidth: float) -> FloatArray:
     """
     Return the gain of the correction of (x, d) by measured angles, shape (m + 1, m / 2).
 
-    It is a stationary Kalman filter. Its noise is chosen so that, each by itself, an angle's
-    estimate has two poles and the disturbance's three, all of the bandwidth [rad/s].
+    It is a stationary Kalman filter. Its noise is chosen so that an angle by itself would have
+    Butterworth's poles at the bandwidth [rad/s], with the disturbance three poles next to it.
     """
     m, angles = chain.order, chain.angles
     inertia = 1.0 / abs(chain.input[angles])

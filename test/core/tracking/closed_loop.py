@@ -80,7 +80,7 @@ class ClosedLoop:
     late: int = 0
     resolution: float = ENCODER
     noise: float = 0.0
-    saturation: float | None = None
+    saturation: list | None = None
     position: np.ndarray | None = None
     push: Callable[[float], float] = lambda _: 0.0
     times: list = field(default_factory=list)
