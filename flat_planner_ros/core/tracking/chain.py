@@ -25,7 +25,6 @@ from functools import cached_property
 
 from flat_planner_ros.core.arm import flat_map, FloatArray, PlanarArm
 import numpy as np
-from scipy.linalg import expm
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +75,7 @@ class Chain:
         return dynamics
 
     @cached_property
-    def input(self) -> FloatArray:
+    def input_effect(self) -> FloatArray:
         """Return b, shape (m,)."""
         effect: FloatArray = self.coordinates[:, -1] / self.input_row[-1]
         return effect
@@ -87,11 +86,13 @@ class Chain:
         m = self.order
         matrix = np.zeros((m + 2, m + 2))
         matrix[:m, :m] = self.dynamics
-        matrix[:m, m:] = self.input[:, None]
+        matrix[:m, m:] = self.input_effect[:, None]
         return matrix
 
     def over(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return what (x, d) and a constant input make after a time [s], (m+1, m+1), (m+1,)."""
+        from scipy.linalg import expm  # here: slow to import
+
         whole = expm(self.disturbed * time)
         return whole[:-1, :-1], whole[:-1, -1]
 

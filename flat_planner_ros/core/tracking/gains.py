@@ -26,7 +26,6 @@ from math import sqrt
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
 from flat_planner_ros.core.tracking.chain import Chain
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 ROUNDING = 1e-9
 """Negative part of P P* - D D* that is forgiven, relative to P P* [-]."""
@@ -106,6 +105,8 @@ def regulator(
         Of the cost sum x^T Q x + R u^2, shape (m, m) and a number.
 
     """
+    from scipy.linalg import solve_discrete_are  # here: slow to import
+
     g = effect[:, None]
     cost = solve_discrete_are(transition, g, state_weight, np.array([[input_weight]]))
     gain = np.linalg.solve(input_weight + g.T @ cost @ g, g.T @ cost @ transition)
@@ -119,8 +120,10 @@ def observer_gain(chain: Chain, period: float, bandwidth: float) -> FloatArray:
     It is a stationary Kalman filter. Its noise is chosen so that an angle by itself would have
     Butterworth's poles at the bandwidth [rad/s], with the disturbance three poles next to it.
     """
+    from scipy.linalg import solve_discrete_are  # here: slow to import
+
     m, angles = chain.order, chain.angles
-    inertia = 1.0 / abs(chain.input[angles])
+    inertia = 1.0 / abs(chain.input_effect[angles])
     noise = np.zeros((m + 1, m + 1))
     noise[angles:m, angles:m] = np.eye(angles) * bandwidth**4 * period
     noise[m, m] = (inertia * bandwidth**3) ** 2 * period

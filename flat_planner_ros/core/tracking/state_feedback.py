@@ -112,7 +112,7 @@ class StateFeedback:
     def _effort(self, state: Estimate, planned: Reference, middle: Reference) -> float:
         """Return the effort of joint n-1 without friction [N m]."""
         own = self._chain.dynamics[2].dot(_links_state(middle))
-        feed_forward = (middle.accelerations[:-1].sum() - own) / self._chain.input[2]
+        feed_forward = (middle.accelerations[:-1].sum() - own) / self._chain.input_effect[2]
         error = state.links[:-1, 0] - _links_state(planned)
         return float(feed_forward - self._links_gain.dot(error) - state.links[-1, 0])
 
@@ -130,7 +130,7 @@ class StateFeedback:
         if self._arm.n == 2:
             return np.array([effort])
         links, chain = state.links[:, 0], self._chain
-        rates = chain.dynamics[2:] @ links[:4] + chain.input[2:] * (effort + links[4])
+        rates = chain.dynamics[2:] @ links[:4] + chain.input_effect[2:] * (effort + links[4])
         rigid = self._arm.rigid_effort(
             state.positions, state.velocities, all_joints(accelerations, rates)
         )

@@ -30,7 +30,7 @@ def test_rows_are_those_of_the_arm_in_any_pose(arm):
         effort = random.normal(size=arm.n - 1) * 0.01
         ddq = arm.forward_dynamics(q, dq, effort)
         state = np.array([q[:-1].sum(), q[-1], dq[:-1].sum(), dq[-1]])
-        rates = chain.dynamics @ state + chain.input * effort[-1]
+        rates = chain.dynamics @ state + chain.input_effect * effort[-1]
         expected = [*state[2:], ddq[:-1].sum(), ddq[-1]]
         np.testing.assert_allclose(rates, expected, rtol=1e-9, atol=1e-9)
 
@@ -40,7 +40,7 @@ def test_held_rows_are_a_spring_on_a_moving_base():
     state, acceleration = np.array([0.3, 0.2, -1.0, 0.7]), 5.0
     _, last = ARM.inertia_star
     spring = ARM.passive_effort(0.2, 0.7) / last - acceleration
-    rates = chain.dynamics @ state + chain.input * acceleration
+    rates = chain.dynamics @ state + chain.input_effect * acceleration
     np.testing.assert_allclose(rates, [-1.0, 0.7, acceleration, spring], rtol=1e-12)
 
 
@@ -50,7 +50,7 @@ def test_a_step_is_the_solution_of_the_differential_equation():
     disturbance = 1e-3
 
     def rate(_, state):
-        return chain.dynamics @ state + chain.input * (effort + disturbance)
+        return chain.dynamics @ state + chain.input_effect * (effort + disturbance)
 
     end = solve_ivp(rate, (0.0, time), start, rtol=1e-10, atol=1e-12).y[:, -1]
     flow, effect = chain.over(time)

@@ -104,7 +104,7 @@ def test_the_observer_is_the_limit_of_a_kalman_filter():
     """The covariance, propagated sample by sample, ends at the gain of the Riccati equation."""
     chain, period, bandwidth = CHAINS['links'], 2e-3, 60.0
     flow, _ = chain.over(period)
-    inertia = 1.0 / chain.input[2]
+    inertia = 1.0 / chain.input_effect[2]
     noise = np.diag([0.0, 0.0, *[bandwidth**4] * 2, (inertia * bandwidth**3) ** 2]) * period
     shown, spread = np.eye(5)[:2], np.eye(5)
     for _ in range(400):
