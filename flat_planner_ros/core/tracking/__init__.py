@@ -17,8 +17,8 @@
 from flat_planner_ros.core.tracking.arm_observer import ArmObserver, Estimate
 from flat_planner_ros.core.tracking.certificate import Certificate, certify
 from flat_planner_ros.core.tracking.moving_start import moving_start, MovingStart
-from flat_planner_ros.core.tracking.planned_motion import PlannedMotion
 from flat_planner_ros.core.tracking.settings import TrackerSettings, Uncertainty
+from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion
 from flat_planner_ros.core.tracking.tracker import Phase, Tracker
 
 __all__ = [
@@ -29,7 +29,7 @@ __all__ = [
     'moving_start',
     'MovingStart',
     'Phase',
-    'PlannedMotion',
+    'TrackedMotion',
     'Tracker',
     'TrackerSettings',
     'Uncertainty',

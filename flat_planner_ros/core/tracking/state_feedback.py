@@ -25,8 +25,8 @@ from flat_planner_ros.core.tracking.arm_observer import (
 )
 from flat_planner_ros.core.tracking.chain import last_links, linearised_joint
 from flat_planner_ros.core.tracking.gains import feedback_gain
-from flat_planner_ros.core.tracking.planned_motion import PlannedMotion, Reference
 from flat_planner_ros.core.tracking.settings import TrackerSettings
+from flat_planner_ros.core.tracking.tracked_motion import Reference, TrackedMotion
 import numpy as np
 
 
@@ -84,7 +84,7 @@ class StateFeedback:
         )
         self._limit = settings.limits_of(arm)
 
-    def command(self, time: float, motion: PlannedMotion) -> Command:
+    def command(self, time: float, motion: TrackedMotion) -> Command:
         """
         Return what to apply, and note that it is applied.
 

@@ -25,9 +25,9 @@ from math import inf
 from flat_planner_ros.core.arm import FloatArray, InvalidCommand, JointSample, PlanarArm
 from flat_planner_ros.core.tracking.arm_observer import Estimate
 from flat_planner_ros.core.tracking.certificate import certify
-from flat_planner_ros.core.tracking.planned_motion import PlannedMotion
 from flat_planner_ros.core.tracking.settings import TrackerSettings
 from flat_planner_ros.core.tracking.state_feedback import distance, StateFeedback
+from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion
 import numpy as np
 
 EARLY = 0.5
@@ -75,8 +75,8 @@ class Tracker:
         self._settings, self._joints = settings, arm.n
         self._feedback = StateFeedback(arm, settings)
         self._observer = self._feedback.observer
-        self._motion: PlannedMotion | None = None
-        self._next: PlannedMotion | None = None
+        self._motion: TrackedMotion | None = None
+        self._next: TrackedMotion | None = None
         self._heard, self._sent = -inf, -inf
         self._efforts = self._last = np.zeros(arm.n - 1)
         self._released = -inf
@@ -84,7 +84,7 @@ class Tracker:
         self._fault, self.error = '', 0.0
         self.phase = Phase.IDLE
 
-    def follow(self, motion: PlannedMotion, now: float) -> None:
+    def follow(self, motion: TrackedMotion, now: float) -> None:
         """
         Follow a motion from its start on, in the place of the present one.
 
@@ -204,7 +204,7 @@ class Tracker:
         self._motion, self._next = self._next, None
         self.phase = Phase.TRACKING
 
-    def _track(self, time: float, now: float, motion: PlannedMotion) -> None:
+    def _track(self, time: float, now: float, motion: TrackedMotion) -> None:
         """Compute the efforts of a motion, or find a reason to give it up."""
         if time > motion.end and not self._settings.hold and self._next is None:
             self.release(now)

@@ -36,7 +36,7 @@ from core.conftest import ARM
 from flat_planner_ros.core.arm import JointSample, PlanarArm
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, Strategy
 from flat_planner_ros.core.plant import SimulatedArm
-from flat_planner_ros.core.tracking import PlannedMotion, Tracker
+from flat_planner_ros.core.tracking import TrackedMotion, Tracker
 import numpy as np
 
 ENCODER = 2 * pi / 2**14
@@ -61,7 +61,7 @@ def samples_of(arm=ARM, *, final=None, duration=1.0, start=None, **request):
 
 def motion_of(samples, start=0.0):
     """Return the motion to follow."""
-    return PlannedMotion(
+    return TrackedMotion(
         start=start,
         times=samples.times,
         positions=samples.positions,

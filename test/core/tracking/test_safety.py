@@ -21,7 +21,7 @@ from core.tracking.closed_loop import ClosedLoop, motion_of, samples_of
 from flat_planner_ros.core.arm import InvalidCommand, InvalidRequest, JointSample
 from flat_planner_ros.core.tracking import (
     Phase,
-    PlannedMotion,
+    TrackedMotion,
     Tracker,
     TrackerSettings,
     Uncertainty,
@@ -194,7 +194,7 @@ def test_refuses_what_it_cannot_follow(samples):
     tracker.hear(JointSample(time=5.0, positions=np.zeros(2)), 5.0)
     with pytest.raises(InvalidCommand, match='ended 4.000 s ago'):
         tracker.follow(motion_of(samples), 5.0)
-    three = PlannedMotion(
+    three = TrackedMotion(
         start=5.0,
         times=np.array([0.0, 1.0]),
         positions=np.zeros((2, 3)),
@@ -220,9 +220,9 @@ def test_refuses_motions_without_meaning(field, values):
         'positions': np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]]),
         'velocities': np.zeros((3, 2)),
     }
-    PlannedMotion(**fine)
+    TrackedMotion(**fine)
     with pytest.raises(InvalidCommand):
-        PlannedMotion(**{**fine, field: np.array(values)})
+        TrackedMotion(**{**fine, field: np.array(values)})
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ class Reference(NamedTuple):
     accelerations: FloatArray
 
 
-class PlannedMotion:
+class TrackedMotion:
     """
     Joint motion on a time axis, at rest after its end.
 
