@@ -57,7 +57,7 @@ def swing(believed):
 times, before = swing(model)
 fit = fit_oscillation(times, before[:, 1], request.duration)
 estimate = identify(times - request.duration, before, fit, model)
-print(f'trustworthy: {estimate.trustworthy}, joint 1 was {estimate.case.value}')
+print(f'trustworthy: {estimate.is_trustworthy}, joint 1 was {estimate.case.value}')
 print(f'stiffness {estimate.stiffness:.3e} N m/rad, truly {truth.stiffness:.3e}')
 print(f'damping   {estimate.damping:.3e} N m s/rad, truly {truth.damping:.3e}')
 

@@ -32,8 +32,8 @@ from flat_planner_ros.core import (
     plan,
     PlanarArm,
     PlanningOptions,
-    remedy,
     rollout,
+    suggest_counterbalances,
 )
 from matplotlib import pyplot as plt
 import numpy as np
@@ -56,7 +56,7 @@ try:
 except NotFlat as error:
     print(f'refused: {error}')
 arms = [0.06, 0.04]  # behind the joints [m]
-print(remedy(**shape, counterbalance_mass=[0.0, 0.0], counterbalance_arm=arms))
+print(suggest_counterbalances(**shape, counterbalance_mass=[0.0, 0.0], counterbalance_arm=arms))
 
 weights = counterbalances(**shape, arm=arms)
 print(f'added: {weights.mass[0]:.3f} kg behind joint 1, {weights.mass[1]:.3f} kg behind joint 2')

@@ -59,7 +59,7 @@ def insensitivity(ran):
 
 def tuning(ran):
     estimate, truth = ran['estimate'], ran['truth']
-    assert estimate.trustworthy
+    assert estimate.is_trustworthy
     assert estimate.stiffness == pytest.approx(truth.stiffness, rel=1e-3)
     before, after = ran['amplitudes']
     assert after < 1e-3 * before

@@ -20,7 +20,7 @@ from flat_planner_ros.core.arm import (
     FlatPlannerError,
     NotFlat,
     PlanarArm,
-    remedy,
+    suggest_counterbalances,
 )
 from flat_planner_ros.core.insensitive import Insensitivity, predict_residual, UncertaintyBox
 from flat_planner_ros.core.monitor import fit_oscillation, identify
@@ -66,7 +66,7 @@ __all__ = [
     'predict_residual',
     'residual_of_plan',
     'QuadraticCost',
-    'remedy',
+    'suggest_counterbalances',
     'rollout',
     'SessionSettings',
     'shortest_plan',

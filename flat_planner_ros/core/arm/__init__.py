@@ -19,7 +19,7 @@ from flat_planner_ros.core.arm.counterbalance import (
     Counterbalances,
     counterbalances,
     displaced_com,
-    remedy,
+    suggest_counterbalances,
 )
 from flat_planner_ros.core.arm.errors import (
     FlatPlannerError,
@@ -34,10 +34,9 @@ from flat_planner_ros.core.arm.errors import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
-from flat_planner_ros.core.arm.joint_sample import JointSample
-from flat_planner_ros.core.arm.link_bodies import bodies_of_constants, bodies_of_links, LinkBody
+from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
 from flat_planner_ros.core.arm.planar_arm import NaturalMode, PlanarArm
-from flat_planner_ros.core.arm.sampled_motion import SampledMotion
+from flat_planner_ros.core.arm.samples import JointSample, SampledMotion
 from flat_planner_ros.core.arm.urdf import (
     ArmDescription,
     ControlBlock,
@@ -49,8 +48,8 @@ from flat_planner_ros.core.arm.urdf import (
 __all__ = [
     'apply_row',
     'ArmDescription',
-    'bodies_of_constants',
-    'bodies_of_links',
+    'bodies_from_links',
+    'bodies_from_reduced',
     'ComplexArray',
     'ControlBlock',
     'Counterbalances',
@@ -72,7 +71,7 @@ __all__ = [
     'OutOfReach',
     'PlanarArm',
     'PLUGINS',
-    'remedy',
+    'suggest_counterbalances',
     'SampledMotion',
     'strict_arithmetic',
     'UncertifiedLoop',

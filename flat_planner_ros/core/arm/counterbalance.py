@@ -111,7 +111,7 @@ def counterbalances(
     return Counterbalances(masses, arms)
 
 
-def remedy(
+def suggest_counterbalances(
     *,
     link_length: npt.ArrayLike,
     link_com: npt.ArrayLike,

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Link data, counterbalances and friction: checked, and summed up to the constants of an arm."""
+"""Links of an arm: summed up to its constants, and as the rigid bodies that simulators want."""
 
-from math import inf
+from math import inf, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm.arrays import FloatArray
@@ -141,3 +141,144 @@ def check_realizable(
                 f'beyond it in proportion to their static moments, relative miss {miss:.3g}, '
                 f'bound {COUPLING_TOLERANCE:g}'
             )
+
+
+DRAWN_LENGTH = 0.1
+"""Length of link n-1 where the model does not tell, for two joints or without a tip mass [m]."""
+
+
+class LinkBody(NamedTuple):
+    """
+    One rigid link with all that is fixed to it; its frame is at its joint, x along the link.
+
+    Attributes
+    ----------
+    length
+        To the next joint, or to the end of the last link [m].
+    tail
+        How far it reaches behind its joint [m].
+    mass
+        Counterbalance included [kg].
+    com
+        Centre of mass, from the joint along the link [m].
+    inertia
+        About the axis through the centre of mass that is parallel to the joints' [kg m^2].
+
+    """
+
+    length: float
+    tail: float
+    mass: float
+    com: float
+    inertia: float
+
+
+def bodies_from_links(
+    *,
+    link_length: npt.ArrayLike,
+    link_com: npt.ArrayLike,
+    link_mass: npt.ArrayLike,
+    link_inertia: npt.ArrayLike,
+    counterbalance_mass: npt.ArrayLike = (0.0, 0.0),
+    counterbalance_arm: npt.ArrayLike = (0.0, 0.0),
+) -> tuple[LinkBody, ...]:
+    """
+    Return the bodies of an arm that is given by its links; parameters as for PlanarArm.from_links.
+
+    Raises
+    ------
+    InvalidModel
+        The arrays have different lengths or numbers without a meaning.
+
+    """
+    links = checked_links(link_length, link_com, link_mass, link_inertia)
+    n = links[0].size
+    weights = checked_vector('counterbalance_mass', counterbalance_mass, 2, 'kg', 0.0)
+    arms = checked_vector('counterbalance_arm', counterbalance_arm, 2, 'm', 0.0)
+    added = [(0.0, 0.0)] * (n - 2) + list(zip(weights.tolist(), arms.tolist(), strict=True))
+    rows = zip(*(array.tolist() for array in links), strict=True)
+    return tuple(_balanced(*row, *extra) for row, extra in zip(rows, added, strict=True))
+
+
+def bodies_from_reduced(
+    *,
+    inertia_star: npt.ArrayLike,
+    link_length: npt.ArrayLike = (),
+    link_com: npt.ArrayLike = (),
+    link_mass: npt.ArrayLike = (),
+    link_inertia: npt.ArrayLike = (),
+    tip_mass: float = 0.0,
+    drawn_length: float | None = None,
+) -> tuple[LinkBody, ...]:
+    """
+    Return bodies that have the constants of a reduced arm.
+
+    The last two links are one choice of many, (R3): all of them move alike.
+
+    Parameters
+    ----------
+    inertia_star, link_length, link_com, link_mass, link_inertia, tip_mass
+        As for PlanarArm.reduced.
+    drawn_length
+        Length of link n-1 [m]. By default it makes the last two links equally heavy; where their
+        mass is not given either, it is `DRAWN_LENGTH`.
+
+    Raises
+    ------
+    InvalidModel
+        The arrays have different lengths or numbers without a meaning.
+
+    """
+    both, last = checked_vector('inertia_star', inertia_star, 2, 'kg m^2').tolist()
+    if not both > last > 0.0:
+        raise InvalidModel(
+            f'inertia_star must satisfy I*_(n-1) > I*_n > 0 kg m^2, got {both:g}, {last:g}'
+        )
+    links = checked_links(link_length, link_com, link_mass, link_inertia)
+    (tip,) = checked_vector('tip_mass', [tip_mass], 1, 'kg', 0.0).tolist()
+    own = both - last
+    is_free = not links[0].size  # of two joints' mass nothing is known: it rests on the base
+    if drawn_length is not None:
+        (length,) = checked_vector('drawn_length', [drawn_length], 1, 'm', 0.0).tolist()
+        if length == 0.0:
+            raise InvalidModel('drawn_length must be above 0 m, got 0')
+    else:
+        length = DRAWN_LENGTH if is_free or tip == 0.0 else sqrt(own / (2.0 * tip))
+    share = own / (2.0 * length**2)
+    if is_free:
+        tip = share
+    elbow = _elbow(own, length, tip, share)
+    bar_mass = tip - elbow.mass
+    half = sqrt(3.0 * last / bar_mass) if bar_mass else length
+    bar = LinkBody(length=half, tail=half, mass=bar_mass, com=0.0, inertia=last)
+    rows = zip(*(array.tolist() for array in links), strict=True)
+    return (*(_balanced(*row) for row in rows), elbow, bar)
+
+
+def _elbow(own: float, length: float, tip: float, share: float) -> LinkBody:
+    """Return link n-1, which balances link n about its joint with half of its inertia, (R3)."""
+    if tip == 0.0:
+        return LinkBody(length=length, tail=length, mass=0.0, com=0.0, inertia=own)
+    carried = tip * share / (tip + share)
+    mass = tip - carried
+    com = -carried * length / mass
+    return LinkBody(length=length, tail=-com, mass=mass, com=com, inertia=own / 2.0)
+
+
+def _balanced(
+    length: float,
+    com: float,
+    mass: float,
+    inertia: float,
+    weight: float = 0.0,
+    arm: float = 0.0,
+) -> LinkBody:
+    """Return a link and its counterbalance as one body, (R1)."""
+    total = mass + weight
+    if total == 0.0:
+        return LinkBody(length=length, tail=0.0, mass=0.0, com=0.0, inertia=inertia)
+    centre = (mass * com - weight * arm) / total
+    about = inertia + mass * (com - centre) ** 2 + weight * (arm + centre) ** 2
+    return LinkBody(
+        length=length, tail=arm if weight else 0.0, mass=total, com=centre, inertia=about
+    )

@@ -21,7 +21,7 @@ from types import MappingProxyType
 from xml.etree.ElementTree import Comment, Element, indent, SubElement, tostring
 
 from flat_planner_ros.core.arm.errors import FlatPlannerError
-from flat_planner_ros.core.arm.link_bodies import LinkBody
+from flat_planner_ros.core.arm.links import LinkBody
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 
 BASE = 'base_link'

@@ -25,9 +25,13 @@ from flat_planner_ros.core.monitor.identification import (
     identify,
     StiffnessEstimate,
 )
-from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Residual, select
+from flat_planner_ros.core.monitor.motion_record import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
-from flat_planner_ros.core.monitor.report import Level, MonitorSettings, VibrationReport
+from flat_planner_ros.core.monitor.report import (
+    Level,
+    MonitorSettings,
+    VibrationReport,
+)
 from flat_planner_ros.core.monitor.vibration_monitor import VibrationMonitor
 
 __all__ = [
@@ -43,7 +47,7 @@ __all__ = [
     'PlannedMotion',
     'ReportedEstimate',
     'Residual',
-    'select',
+    'joint_indices',
     'StiffnessEstimate',
     'VibrationMonitor',
     'VibrationReport',

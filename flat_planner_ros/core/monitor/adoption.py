@@ -81,11 +81,11 @@ class ReportedEstimate:
             if not (isfinite(value) and value >= 0.0):
                 raise InvalidRequest(f'{name} of an estimate must be at least 0, got {value}')
 
-    def is_of(self, start: float) -> bool:
+    def is_of_motion(self, start: float) -> bool:
         """Return whether the estimate follows the motion with a start [s]."""
         return abs(self.start_time - start) <= SAME_START
 
-    def confirms(self, arm: PlanarArm) -> bool:
+    def agrees_with(self, arm: PlanarArm) -> bool:
         """Return whether the arm has these values but for the standard errors."""
         return all(
             abs(new - old) <= AGREEMENT * std + REFINEMENT * old
@@ -139,7 +139,7 @@ class ModelTuner:
 
     def propose(self, arm: PlanarArm, joint: str) -> Adoption:
         """
-        Return the change that the last estimate asks for; `confirm` it once it is made.
+        Return the change that the last estimate asks for; `mark_adopted` it once it is made.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class ModelTuner:
                 f'the estimate rests on a nominal inertia of {estimate.inertia:.6g} kg m^2, the '
                 f'model here has {inertia:.6g} kg m^2: give both nodes the same model'
             )
-        if estimate.confirms(arm):
+        if estimate.agrees_with(arm):
             raise AdoptionRefused(
                 f'nothing to adopt: the estimate confirms the present stiffness '
                 f'{arm.stiffness:.6g} N m/rad and damping {arm.damping:.6g} N m s/rad'
@@ -179,6 +179,6 @@ class ModelTuner:
         tuned = replace(arm, stiffness=estimate.stiffness, damping=estimate.damping)
         return Adoption(estimate=estimate, former=arm, arm=tuned)
 
-    def confirm(self, adoption: Adoption) -> None:
+    def mark_adopted(self, adoption: Adoption) -> None:
         """Remember that an adoption has been made, so that it is not made again."""
         self._adopted = adoption.estimate

@@ -20,8 +20,7 @@ from math import hypot, pi, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
-from flat_planner_ros.core.monitor.oscillation import OscillationFit
-from flat_planner_ros.core.monitor.oscillation_search import basis_columns, solve_linear
+from flat_planner_ros.core.monitor.oscillation import basis_columns, OscillationFit, solve_linear
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -99,7 +98,7 @@ class StiffnessEstimate:
         Whether joint n-1 was free or held, ``None`` if that is not clear.
     inertia
         What the passive joint oscillates then, by the nominal model [kg m^2].
-    trustworthy
+    is_trustworthy
         Whether the values are good enough to plan with.
     reason
         Why not; empty if they are.
@@ -112,7 +111,7 @@ class StiffnessEstimate:
     damping_std: float | None = None
     case: ActuatedJoints | None = None
     inertia: float | None = None
-    trustworthy: bool = False
+    is_trustworthy: bool = False
     reason: str
 
 
@@ -203,7 +202,7 @@ def identify(
         _doubt_of_values(estimate, arm, pole, decay_std),
     )
     reason = next(filter(None, doubts), '')
-    return replace(estimate, trustworthy=not reason, reason=reason)
+    return replace(estimate, is_trustworthy=not reason, reason=reason)
 
 
 class _Pole(NamedTuple):

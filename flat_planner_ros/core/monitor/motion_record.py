@@ -180,7 +180,7 @@ class Record:
         return inside[:, 0], inside[:, 1:]
 
 
-def select(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.intp]:
+def joint_indices(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.intp]:
     """
     Return where each wanted joint stands among the names.
 

@@ -12,15 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a vibration monitor tolerates, and its report."""
+"""What a monitor tolerates, and its report on what a motion leaves behind."""
 
 from dataclasses import dataclass
 from enum import Enum
-from math import isfinite
+from math import isfinite, sqrt
 
-from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
-from flat_planner_ros.core.monitor.identification import ActuatedJoints, StiffnessEstimate
-from flat_planner_ros.core.monitor.oscillation import OscillationFit
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.monitor.identification import (
+    ActuatedJoints,
+    identify,
+    StiffnessEstimate,
+)
+from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record
+from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
+import numpy as np
 
 
 class Level(Enum):
@@ -143,36 +149,210 @@ class VibrationReport:
     estimate: StiffnessEstimate | None = None
 
     @property
-    def amplitude(self) -> float | None:
-        """Return the envelope of the oscillation at T [rad]."""
-        return self.fit.amplitude
-
-    @property
-    def peak_to_peak(self) -> float | None:
-        """Return the swing of the passive joint over the window [rad]."""
-        return self.fit.peak_to_peak
-
-    @property
-    def frequency(self) -> float | None:
-        """Return the damped frequency [Hz]."""
-        return self.fit.frequency
-
-    @property
-    def damping_ratio(self) -> float | None:
-        """Return the damping ratio [-]."""
-        return self.fit.damping_ratio
-
-    @property
-    def bias(self) -> float | None:
-        """Return the middle of the oscillation minus the final position [rad]."""
-        return self.fit.bias
-
-    @property
-    def fit_rms(self) -> float | None:
-        """Return what the fit leaves [rad]."""
-        return self.fit.fit_rms
-
-    @property
-    def settled(self) -> bool:
+    def is_settled(self) -> bool:
         """Return whether the passive joint came to rest within the window."""
         return self.settling_time is not None
+
+
+EFFORT_GAP = 0.1
+"""Longest hole in the measured efforts that their RMS forgives, relative to the motion [-]."""
+
+WINDOW_GAP = 0.1
+"""Longest delay of the first sample after the motion left unsaid, relative to the window [-]."""
+
+
+def assess(
+    motion: PlannedMotion,
+    settings: MonitorSettings,
+    positions: Record,
+    efforts: Record,
+    until: float,
+    cause: str = '',
+    *,
+    stale: bool = False,
+) -> VibrationReport:
+    """
+    Judge what a motion left behind.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    settings
+        Window, tolerances and expectations.
+    positions, efforts
+        Measured joint positions after [rad] and joint efforts during the motion [N m].
+    until
+        Time at which the window is cut at the latest [s].
+    cause
+        Why it is cut, if it is.
+    stale
+        Whether the samples have stopped coming.
+
+    Returns
+    -------
+    VibrationReport
+        The verdict.
+
+    """
+    times, rows = positions.between(motion.end, min(until, motion.end + settings.window))
+    errors = rows - motion.final
+    fit = fit_oscillation(times, errors[:, -1], motion.end)
+    estimate = _estimate(times - motion.end, errors, fit, settings)
+    frequency = fit.frequency or settings.expected_frequency
+    settling = _settling_time(times - motion.end, errors[:, -1], settings.settling_band, frequency)
+    start = times[-1] - 1.0 / frequency if frequency and times.size else motion.end
+    rms = tuple(
+        _rms_effort(*efforts.between(motion.start, motion.end), joint, motion)
+        for joint in range(len(motion.joint_names))
+    )
+    late = float(times[0]) - motion.end if times.size else 0.0
+    # Nothing seen is said once, not once for every number that is missing.
+    remarks: tuple[str, ...] = (cause or fit.reason,)
+    if times.size:
+        remarks = (
+            cause,
+            fit.reason,
+            f'first sample {late:.3g} s after the motion'
+            if late > WINDOW_GAP * settings.window
+            else '',
+            _settling_remark(settling, settings.settling_band),
+            _effort_remark(motion.joint_names, rms),
+            _estimate_remark(estimate, fit),
+        )
+    return VibrationReport(
+        level=Level.STALE if stale else _level(fit, settings),
+        message='; '.join((_verdict(fit, settings), *filter(None, remarks))),
+        start_time=motion.start,
+        end_time=motion.end,
+        joint=motion.joint_names[-1],
+        fit=fit,
+        frequency_expected=settings.expected_frequency,
+        damping_expected=settings.expected_damping_ratio,
+        settling_time=settling,
+        joint_names=motion.joint_names,
+        final_error=_time_mean(times, errors, start),
+        rms_effort=rms,
+        window=float(times[-1]) - motion.end if times.size else 0.0,
+        samples=times.size,
+        estimate=estimate,
+    )
+
+
+def _estimate(
+    elapsed: FloatArray, errors: FloatArray, fit: OscillationFit, settings: MonitorSettings
+) -> StiffnessEstimate | None:
+    """Return stiffness and damping if there is a model of the joints that are planned."""
+    arm, joints = settings.arm, errors.shape[1]
+    if arm is None:
+        return None
+    if joints != arm.n:
+        return StiffnessEstimate(reason=f'the plan has {joints} joints, the model {arm.n}')
+    return identify(elapsed, errors, fit, arm, settings.actuated_joints)
+
+
+def _settling_time(
+    elapsed: FloatArray, errors: FloatArray, band: float, frequency: float | None
+) -> float | None:
+    """Return when the errors stay within the band, seen for half a period at least."""
+    outside = np.flatnonzero(np.abs(errors) > band)
+    first = int(outside[-1]) + 1 if outside.size else 0
+    if first >= elapsed.size:
+        return None
+    if frequency is not None and elapsed[-1] - elapsed[first] < 0.5 / frequency:
+        return None
+    return float(elapsed[first]) if first else 0.0
+
+
+def _time_mean(times: FloatArray, rows: FloatArray, start: float) -> tuple[float, ...]:
+    """Return each column's mean from start to the last sample, linear between samples."""
+    if times.size == 0:
+        return ()
+    start = max(start, float(times[0]))
+    if start == times[-1]:
+        return tuple(map(float, rows[-1]))
+    grid = np.concatenate(([start], times[times > start]))
+    span = grid[-1] - start
+    return tuple(_integral(np.interp(grid, times, column), grid) / span for column in rows.T)
+
+
+def _rms_effort(
+    times: FloatArray, efforts: FloatArray, joint: int, motion: PlannedMotion
+) -> float | None:
+    """Return the time RMS of a joint's effort, or None if the samples have a hole."""
+    known = np.isfinite(efforts[:, joint])
+    duration = motion.end - motion.start
+    ends = np.array((motion.start, motion.end))
+    gaps = np.diff(np.concatenate((ends[:1], times[known], ends[1:])))
+    if not known.any() or gaps.max() > EFFORT_GAP * duration:
+        return None
+    grid = np.unique(np.concatenate((ends, times[known])))
+    squares = np.interp(grid, times[known], efforts[known, joint] ** 2)
+    return sqrt(_integral(squares, grid) / duration) if duration > 0.0 else None
+
+
+def _integral(values: FloatArray, grid: FloatArray) -> float:
+    """Return the integral of samples that are joined linearly."""
+    from scipy.integrate import trapezoid  # here: slow to import, and only needed for a report
+
+    return float(trapezoid(values, grid))
+
+
+def _level(fit: OscillationFit, settings: MonitorSettings) -> Level:
+    """Return the verdict; half the swing stands in for a missing amplitude."""
+    if fit.amplitude is None:
+        swing = (fit.peak_to_peak or 0.0) / 2
+        return Level.ERROR if swing > settings.amplitude_error else Level.WARN
+    if fit.amplitude <= settings.amplitude_ok:
+        return Level.OK
+    return Level.WARN if fit.amplitude <= settings.amplitude_error else Level.ERROR
+
+
+def _verdict(fit: OscillationFit, settings: MonitorSettings) -> str:
+    """Return the amplitude against its bounds, with frequency and damping if known."""
+    if fit.amplitude is None:
+        swing = f', swing {fit.peak_to_peak:.3g} rad' if fit.peak_to_peak is not None else ''
+        return f'amplitude unknown{swing}'
+    if fit.amplitude <= settings.amplitude_ok:
+        comparison = f'within {settings.amplitude_ok:.3g} rad'
+    else:
+        error = fit.amplitude > settings.amplitude_error
+        bound = settings.amplitude_error if error else settings.amplitude_ok
+        comparison = f'above {bound:.3g} rad'
+    text = f'amplitude {fit.amplitude:.3g} rad {comparison}'
+    expectations: tuple[tuple[str, float | None, float | None, str], ...] = (
+        ('frequency', fit.frequency, settings.expected_frequency, ' Hz'),
+        ('damping ratio', fit.damping_ratio, settings.expected_damping_ratio, ''),
+    )
+    for name, value, expected, unit in expectations:
+        if value is not None:
+            text += f', {name} {value:.4g}{unit}'
+            text += f' (expected {expected:.4g})' if expected is not None else ''
+    return text
+
+
+def _settling_remark(settling: float | None, band: float) -> str:
+    """Return whether and when the joint settled."""
+    if settling is None:
+        return f'not settled within {band:.3g} rad'
+    return f'settled within {band:.3g} rad after {settling:.3g} s'
+
+
+def _effort_remark(names: tuple[str, ...], rms: tuple[float | None, ...]) -> str:
+    """Return whose effort was not measured throughout, if anyone's."""
+    unknown = ', '.join(name for name, value in zip(names, rms, strict=True) if value is None)
+    return f'effort of {unknown} not measured throughout the motion' if unknown else ''
+
+
+def _estimate_remark(estimate: StiffnessEstimate | None, fit: OscillationFit) -> str:
+    """Return stiffness and damping, or why they are not estimated unless that has been said."""
+    if estimate is None:
+        return ''
+    if not estimate.is_trustworthy or estimate.case is None:
+        reason = '' if fit.reason == estimate.reason else f' ({estimate.reason})'
+        return f'stiffness and damping not estimated{reason}'
+    return (
+        f'stiffness {estimate.stiffness:.6g} ± {estimate.stiffness_std:.2g} N m/rad and damping '
+        f'{estimate.damping:.4g} ± {estimate.damping_std:.2g} N m s/rad, estimated with the '
+        f'actuated joints {estimate.case.value}'
+    )

@@ -18,9 +18,8 @@ from enum import Enum
 from math import inf, isfinite, nan
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, JointSample
-from flat_planner_ros.core.monitor.assessment import assess
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record, Residual
-from flat_planner_ros.core.monitor.report import MonitorSettings, VibrationReport
+from flat_planner_ros.core.monitor.report import assess, MonitorSettings, VibrationReport
 import numpy as np
 
 JUMP = 0.2
@@ -71,7 +70,7 @@ class VibrationMonitor:
 
     def reset(self) -> None:
         """Forget motions, samples and times."""
-        self._state = Phase.IDLE
+        self._phase = Phase.IDLE
         self._motion: PlannedMotion | None = None
         self._pending: PlannedMotion | None = None
         self._now = self._last_sample = self._heard = -inf
@@ -82,9 +81,9 @@ class VibrationMonitor:
         self._positions = self._efforts = Record(0)
 
     @property
-    def state(self) -> Phase:
+    def phase(self) -> Phase:
         """Return the phase of the motion that started last."""
-        return self._state
+        return self._phase
 
     @property
     def motion(self) -> PlannedMotion | None:
@@ -96,7 +95,7 @@ class VibrationMonitor:
         """Return the number of unusable samples since the last reset [-]."""
         return self._dropped
 
-    def take_troubles(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """Return what was wrong with the samples since this was last asked, a sentence each."""
         troubles, new = [], self._dropped - self._told
         if self._set_back:
@@ -109,7 +108,7 @@ class VibrationMonitor:
         self._told, self._set_back = self._dropped, 0.0
         return troubles
 
-    def plan(self, motion: PlannedMotion) -> list[VibrationReport]:
+    def watch(self, motion: PlannedMotion) -> list[VibrationReport]:
         """
         Take a planned motion, to be watched from its start.
 
@@ -162,7 +161,7 @@ class VibrationMonitor:
         former, self._last = self._last, sample
         self._last_sample = self._heard = time
         motion = self._motion
-        if motion is None or self._state is Phase.DONE:
+        if motion is None or self._phase is Phase.DONE:
             return self._take_reports()
         _check_size(sample, motion)
         # Between two motions an arm may be put elsewhere, and nobody minds.
@@ -240,8 +239,8 @@ class VibrationMonitor:
         silence = now - self._heard
         if self._is_watching() and silence > self.settings.timeout:
             self._close(now, f'no samples for {silence:.3g} s', stale=True)
-        if self._state is Phase.MOVING and self._motion is not None and now >= self._motion.end:
-            self._state = Phase.SETTLING
+        if self._phase is Phase.MOVING and self._motion is not None and now >= self._motion.end:
+            self._phase = Phase.SETTLING
         self._start_pending(self._now)
 
     def _reset_by(self, step: float) -> None:
@@ -251,7 +250,7 @@ class VibrationMonitor:
 
     def _is_watching(self) -> bool:
         """Return whether a motion has started and has no report yet."""
-        return self._state in (Phase.MOVING, Phase.SETTLING)
+        return self._phase in (Phase.MOVING, Phase.SETTLING)
 
     def _start_pending(self, now: float) -> None:
         """Start the waiting motion if it is time, and report on a former still settling."""
@@ -271,14 +270,14 @@ class VibrationMonitor:
         self._positions = Record(len(motion.joint_names))
         self._motion, self._pending, self._heard = motion, None, now
         if now < motion.end:
-            self._state = Phase.MOVING
+            self._phase = Phase.MOVING
         else:
             is_past = now > motion.end + self.settings.window
-            self._state = Phase.DONE if is_past else Phase.SETTLING
+            self._phase = Phase.DONE if is_past else Phase.SETTLING
 
     def _close(self, until: float, cause: str = '', *, stale: bool = False) -> None:
         """End the watch of the present motion and judge it on the samples before `until`."""
-        self._state = Phase.DONE
+        self._phase = Phase.DONE
         if self._motion is not None:
             measured = self._positions, self._efforts
             report = assess(self._motion, self.settings, *measured, until, cause, stale=stale)

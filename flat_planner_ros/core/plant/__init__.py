@@ -16,10 +16,8 @@
 
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.paced_arm import PacedArm
-from flat_planner_ros.core.plant.rollout import rollout
-from flat_planner_ros.core.plant.sensing import Sensing
-from flat_planner_ros.core.plant.settings import SimulationSettings
-from flat_planner_ros.core.plant.simulation import ArmState, SimulatedArm
+from flat_planner_ros.core.plant.settings import Sensing, SimulationSettings
+from flat_planner_ros.core.plant.simulation import ArmState, rollout, SimulatedArm
 
 __all__ = [
     'ArmState',

@@ -14,15 +14,13 @@
 
 """A simulated arm in time with a clock: even samples, bounded catching up, nothing hidden."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import floor
 
 from flat_planner_ros.core.arm import InvalidCommand, InvalidModel
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.sensing import Sensor
-from flat_planner_ros.core.plant.settings import SimulationSettings
+from flat_planner_ros.core.plant.settings import Sensor, SimulationSettings
 from flat_planner_ros.core.plant.simulation import ArmState, GRID_TOLERANCE, SimulatedArm
-from flat_planner_ros.core.plant.troubles import Troubles
 import numpy as np
 import numpy.typing as npt
 
@@ -267,7 +265,7 @@ class PacedArm:
         # Twice as often as a leading arm needs, so that it can make up for a pause.
         return max(self._settings.rate, MIN_CALL_RATE, 2.0 * factor / BATCH)
 
-    def take_troubles(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """Return what went wrong since this was last asked, a sentence each."""
         troubles, self._troubles = self._troubles, Troubles()
         return troubles.sentences(self._simulated)
@@ -343,3 +341,61 @@ class PacedArm:
         if profile is not None and self.time - lag < profile.end:
             self._troubles.has_dropped = True
         self._drop()
+
+
+@dataclass(kw_only=True)
+class Troubles:
+    """
+    What went wrong since it was last told.
+
+    Attributes
+    ----------
+    skipped
+        Time that passed without the arm [s].
+    has_dropped
+        Whether a command was dropped there.
+    set_back
+        Time by which the clock was set back [s].
+    behind
+        Time by which an arm that leads is too slow [s].
+    broken
+        Silence that ended a stream of efforts [s], 0 without any.
+
+    """
+
+    skipped: float = 0.0
+    has_dropped: bool = False
+    set_back: float = 0.0
+    behind: float = 0.0
+    broken: float = 0.0
+
+    def sentences(self, simulated: SimulatedArm) -> list[str]:
+        """Return a sentence each, those of the arm itself first; its clipped steps count anew."""
+        troubles = []
+        if simulated.fault:
+            troubles.append(f'the arm has been stopped until it is reset: {simulated.fault}')
+        clipped = simulated.take_clipped_steps()
+        if clipped:
+            troubles.append(f'effort clipped by the saturation in {clipped} steps')
+        if self.broken:
+            troubles.append(
+                f'the stream of efforts broke, none came for {self.broken:g} s: nothing is '
+                'applied any more'
+            )
+        if self.skipped:
+            command = '; its command was dropped' if self.has_dropped else ''
+            troubles.append(
+                f'{self.skipped:.3f} s skipped to keep up with the clock: the arm stood still'
+                f'{command}'
+            )
+        if self.set_back:
+            troubles.append(
+                f'the clock was set back by {self.set_back:.3f} s: the arm kept its state, its '
+                'command was dropped'
+            )
+        if self.behind:
+            troubles.append(
+                f'the simulated time is {self.behind:.3f} s behind its real_time_factor: this '
+                'machine is too slow or busy'
+            )
+        return troubles

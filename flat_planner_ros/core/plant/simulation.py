@@ -12,11 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-True dynamics of an arm under a stamped effort command.
-
-Nothing here knows of flatness or planning, so that the simulated arm can prove a plan wrong.
-"""
+"""True dynamics of an arm under a stamped effort command."""
 
 from math import floor, inf
 from typing import NamedTuple
@@ -346,3 +342,63 @@ class SimulatedArm:
             reference = profile.reference(t)
             return reference._replace(effort=idle.effort) if is_idle else reference
         return idle if is_idle else idle._replace(effort=profile.effort(t))
+
+
+class Rollout(NamedTuple):
+    """
+    States on a time grid.
+
+    Attributes
+    ----------
+    times
+        Shape (m,) [s].
+    positions, velocities
+        Shape (m, n) [rad], [rad/s].
+
+    """
+
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray
+
+
+def rollout(
+    arm: PlanarArm,
+    profile: EffortProfile,
+    until: float,
+    *,
+    step: float = 1e-3,
+    position: npt.ArrayLike | None = None,
+    saturation: npt.ArrayLike | None = None,
+    feedback_p: npt.ArrayLike | None = None,
+    feedback_d: npt.ArrayLike | None = None,
+) -> Rollout:
+    """
+    Return the motion of an arm, at rest when the profile starts, at every step.
+
+    Parameters
+    ----------
+    arm, profile
+        What is moved and by what.
+    until
+        Absolute time of the end [s].
+    step, position, saturation, feedback_p, feedback_d
+        As in SimulatedArm.
+
+    """
+    simulated = SimulatedArm(
+        arm,
+        position=position,
+        time=profile.start,
+        step=step,
+        saturation=saturation,
+        feedback_p=feedback_p,
+        feedback_d=feedback_d,
+    )
+    simulated.command(profile, profile.start)
+    times, positions, velocities = [simulated.time], [simulated.position], [simulated.velocity]
+    while simulated.advance(min(until, simulated.time + step)):
+        times.append(simulated.time)
+        positions.append(simulated.position)
+        velocities.append(simulated.velocity)
+    return Rollout(np.array(times), np.array(positions), np.array(velocities))

@@ -68,7 +68,7 @@ class ModelAdoption:
             return
         self._tuner.hear(estimate)
         start = self._last_start()
-        if self._settings().auto_tune and start is not None and estimate.is_of(start):
+        if self._settings().auto_tune and start is not None and estimate.is_of_motion(start):
             try:
                 self._adopt()
             except AdoptionRefused as refusal:
@@ -92,7 +92,7 @@ class ModelAdoption:
         result = self._node.set_parameters_atomically(model_parameters(**values))
         if not result.successful:
             raise AdoptionRefused(f'the parameters refuse the estimate: {result.reason}')
-        self._tuner.confirm(adoption)
+        self._tuner.mark_adopted(adoption)
         status = diagnostics.adopted_status(adoption)
         self._announce(status)
         return status

@@ -123,7 +123,7 @@ class MonitorNode(Node):
             self._forget()
             self._reader = conversions.JointStateReader(motion.joint_names)
         self._plan = motion
-        self._publish_reports(self._monitor.plan(motion))
+        self._publish_reports(self._monitor.watch(motion))
 
     def _on_measured(self, msg: JointState) -> None:
         """Take a sample and tell how far it is from the plan."""
@@ -176,9 +176,9 @@ class MonitorNode(Node):
 
     def _on_diagnostics(self) -> None:
         """Publish the present state, and say what was wrong since the last time."""
-        for trouble in self._monitor.take_troubles():
+        for trouble in self._monitor.take_warnings():
             self.get_logger().warning(trouble)
-        phase, dropped = self._monitor.state.value, self._monitor.dropped
+        phase, dropped = self._monitor.phase.value, self._monitor.dropped
         status = diagnostics.monitor_status(self._report, phase, dropped)
         self._health.publish(diagnostics.array_of(status, self._now()))
 

@@ -154,7 +154,7 @@ class PlantNode(Node):
 
     def _on_watch(self) -> None:
         """Say what went wrong, with numbers, at most once per period."""
-        for trouble in self._arm.take_troubles():
+        for trouble in self._arm.take_warnings():
             self.get_logger().warning(trouble)
 
 

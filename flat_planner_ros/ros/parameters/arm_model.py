@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from flat_planner_ros.core.arm import displaced_com, NotFlat, PlanarArm, remedy
+from flat_planner_ros.core.arm import displaced_com, NotFlat, PlanarArm, suggest_counterbalances
 from flat_planner_ros.ros.parameters.row import (
     DOUBLE,
     DOUBLES,
@@ -150,7 +150,7 @@ def _check_flat(arm: PlanarArm, links: Mapping[str, Any]) -> None:
     try:
         arm.check_flat()
     except NotFlat as error:
-        mended = remedy(**{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'})
+        mended = suggest_counterbalances(**{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'})
         raise NotFlat(error.link, error.static_moment, f'{error}; {mended}') from error
 
 

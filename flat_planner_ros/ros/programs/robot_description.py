@@ -20,8 +20,8 @@ from pathlib import Path
 
 from flat_planner_ros.core.arm import (
     ArmDescription,
-    bodies_of_constants,
-    bodies_of_links,
+    bodies_from_links,
+    bodies_from_reduced,
     ControlBlock,
     LinkBody,
     urdf_of,
@@ -107,8 +107,8 @@ def _bodies_of(values: Values, drawn_length: float | None) -> tuple[LinkBody, ..
     """Return the links of either form of the model."""
     links = {name: values[f'model.{name}'] for name in LINK_ARRAYS if f'model.{name}' in values}
     if 'model.inertia_star' not in values:
-        return bodies_of_links(**links)
-    return bodies_of_constants(
+        return bodies_from_links(**links)
+    return bodies_from_reduced(
         inertia_star=values['model.inertia_star'],
         tip_mass=values.get('model.tip_mass', 0.0),
         drawn_length=drawn_length,

@@ -188,7 +188,7 @@ class _Player:
             self._reader = conversions.JointStateReader(motion.joint_names)
             self._samples.clear()
         self._motions.append(motion)
-        self._keep(self.monitor.plan(motion))
+        self._keep(self.monitor.watch(motion))
 
     def _take_state(self, msg: Any) -> None:
         """Take a joint state."""

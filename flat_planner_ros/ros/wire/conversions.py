@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidRequest, JointSample
-from flat_planner_ros.core.monitor import PlannedMotion, Residual, select
+from flat_planner_ros.core.monitor import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
 from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
@@ -182,7 +182,9 @@ class JointStateReader:
         """
         names = msg.name
         if names != self._names:
-            self._indices = slice(None) if names == self.joints else select(names, self.joints)
+            self._indices = (
+                slice(None) if names == self.joints else joint_indices(names, self.joints)
+            )
             self._names = names
         count = len(names)
         if len(msg.position) != count:
@@ -265,7 +267,7 @@ def effort_profile(points: PointTable, joints: Sequence[str], now: float) -> Eff
     }.items():
         if table is not None and not np.isfinite(table).all():
             raise InvalidCommand(f'{field} must be finite')
-    actuated = select(names, joints[:-1])
+    actuated = joint_indices(names, joints[:-1])
     return EffortProfile(
         start=points.stamp or now,
         times=points.times,

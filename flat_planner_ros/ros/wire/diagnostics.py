@@ -273,27 +273,27 @@ def _report_values(report: VibrationReport) -> Values:
         'start_time': f'{report.start_time:.9f}',
         'end_time': f'{report.end_time:.9f}',
         'joint': report.joint,
-        'amplitude': report.amplitude,
-        'peak_to_peak': report.peak_to_peak,
-        'frequency': report.frequency,
+        'amplitude': report.fit.amplitude,
+        'peak_to_peak': report.fit.peak_to_peak,
+        'frequency': report.fit.frequency,
         'frequency_expected': report.frequency_expected,
-        'damping_ratio': report.damping_ratio,
+        'damping_ratio': report.fit.damping_ratio,
         'damping_expected': report.damping_expected,
         'settling_time': report.settling_time,
-        'settled': report.settled if seen else None,
-        'bias': report.bias,
+        'settled': report.is_settled if seen else None,
+        'bias': report.fit.bias,
         **_joint_values('final_error', report.joint_names, report.final_error),
         **_joint_values('rms_effort', report.joint_names, report.rms_effort),
         'window': report.window if seen else None,
         'samples': report.samples,
-        'fit_rms': report.fit_rms,
+        'fit_rms': report.fit.fit_rms,
         **_estimate_values(report.estimate),
     }
 
 
 def _estimate_values(estimate: StiffnessEstimate | None) -> Values:
     """Return an estimate that can be trusted, else nothing."""
-    if estimate is None or not estimate.trustworthy or estimate.case is None:
+    if estimate is None or not estimate.is_trustworthy or estimate.case is None:
         return {}
     return {
         'stiffness_estimate': estimate.stiffness,

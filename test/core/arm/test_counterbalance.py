@@ -16,7 +16,11 @@
 
 import re
 
-from flat_planner_ros.core.arm.counterbalance import counterbalances, displaced_com, remedy
+from flat_planner_ros.core.arm.counterbalance import (
+    counterbalances,
+    displaced_com,
+    suggest_counterbalances,
+)
 from flat_planner_ros.core.arm.errors import InvalidModel, NotFlat
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 import numpy as np
@@ -81,7 +85,7 @@ def test_the_last_counterbalance_rides_on_the_link_before():
 def test_the_remedy_is_one(n):
     """Both ways that the sentence offers make the arm flat as they are printed."""
     links, mass, arm = links_of(n), [0.5, 0.2], [0.15, 0.06]
-    text = remedy(**links, counterbalance_mass=mass, counterbalance_arm=arm)
+    text = suggest_counterbalances(**links, counterbalance_mass=mass, counterbalance_arm=arm)
     offers = re.findall(r'counterbalance_(mass|arm) = \[(\S+), (\S+)\]', text)
     assert [name for name, *_ in offers] == ['arm', 'mass']
     for name, *numbers in offers:
@@ -92,7 +96,9 @@ def test_the_remedy_is_one(n):
 @pytest.mark.parametrize('n', SIZES)
 def test_an_arm_without_counterbalances_is_suggested_some(n):
     links = links_of(n)
-    text = remedy(**links, counterbalance_mass=[0.0, 0.0], counterbalance_arm=[0.0, 0.0])
+    text = suggest_counterbalances(
+        **links, counterbalance_mass=[0.0, 0.0], counterbalance_arm=[0.0, 0.0]
+    )
     offers = {
         name: [float(x) for x in numbers]
         for name, *numbers in re.findall(
@@ -105,11 +111,15 @@ def test_an_arm_without_counterbalances_is_suggested_some(n):
 
 def test_the_remedy_leaves_out_what_is_impossible():
     links = links_of(3)
-    text = remedy(**links, counterbalance_mass=[0.5, 0.2], counterbalance_arm=[0.15, 0.0])
+    text = suggest_counterbalances(
+        **links, counterbalance_mass=[0.5, 0.2], counterbalance_arm=[0.15, 0.0]
+    )
     assert 'counterbalance_arm = [' in text
     assert 'counterbalance_mass = [' not in text
     links['link_com'][-1] = -0.1
-    text = remedy(**links, counterbalance_mass=[0.5, 0.2], counterbalance_arm=[0.15, 0.1])
+    text = suggest_counterbalances(
+        **links, counterbalance_mass=[0.5, 0.2], counterbalance_arm=[0.15, 0.1]
+    )
     assert text == 'no counterbalance behind the joints can balance it'
 
 

@@ -28,7 +28,7 @@ from flat_planner_ros.core import (
     PlanningOptions,
     Strategy,
 )
-from flat_planner_ros.core.arm import bodies_of_constants, bodies_of_links
+from flat_planner_ros.core.arm import bodies_from_links, bodies_from_reduced
 from flat_planner_ros.core.arm.urdf import (
     ArmDescription,
     ControlBlock,
@@ -70,10 +70,10 @@ def describe(model, *, gravity=0.0, friction=0.0, **options):
     }
     if 'inertia_star' in model:
         arm = PlanarArm.reduced(**model, **SPRING, **motors, gravity=gravity)
-        bodies = bodies_of_constants(**model)
+        bodies = bodies_from_reduced(**model)
     else:
         arm = PlanarArm.from_links(**model, **SPRING, **motors, gravity=gravity)
-        bodies = bodies_of_links(**model)
+        bodies = bodies_from_links(**model)
     joints = [f'joint{i + 1}' for i in range(n)]
     return ArmDescription(joints=joints, arm=arm, bodies=bodies, **options)
 

@@ -63,7 +63,7 @@ def test_an_estimate_is_adopted_once_however_often_it_is_heard(tuner, paper_arm,
     first = tuner.propose(paper_arm, 'joint2')
     again = tuner.propose(paper_arm, 'joint2')  # a proposal that came to nothing
     assert again.arm.stiffness == first.arm.stiffness
-    tuner.confirm(first)
+    tuner.mark_adopted(first)
     tuner.hear(estimate)
     with pytest.raises(AdoptionRefused, match='adopted already'):
         tuner.propose(paper_arm, 'joint2')
@@ -93,7 +93,7 @@ def test_what_the_errors_explain_is_nothing_new(paper_arm, estimate, stiffness, 
         stiffness=paper_arm.stiffness + stiffness * estimate.stiffness_std,
         damping=paper_arm.damping + damping * estimate.damping_std,
     )
-    assert shifted.confirms(paper_arm) is not is_new
+    assert shifted.agrees_with(paper_arm) is not is_new
     tuner = ModelTuner()
     tuner.hear(shifted)
     if is_new:
@@ -105,8 +105,8 @@ def test_what_the_errors_explain_is_nothing_new(paper_arm, estimate, stiffness, 
 
 def test_a_motion_is_recognised_by_its_start(estimate):
     # Reports round to nanoseconds, seconds since 1970 to 0.2 microseconds.
-    assert estimate.is_of(1.7e9 + 4e-7)
-    assert not estimate.is_of(1.7e9 + 1e-3)
+    assert estimate.is_of_motion(1.7e9 + 4e-7)
+    assert not estimate.is_of_motion(1.7e9 + 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from flat_planner_ros.core.monitor.identification import (
 )
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.rollout import rollout
+from flat_planner_ros.core.plant.simulation import rollout
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -102,7 +102,7 @@ def test_exact_samples_give_back_the_arm(paper_arm, case, scale, amplitude):
     plant = plant_of(scale)
     t, q = swing(plant, case, amplitude)
     estimate = estimate_of(t, q + np.array((2.0, -0.01)) + 0.02 * t[:, None], paper_arm)
-    assert (estimate.trustworthy, estimate.reason) == (True, '')
+    assert (estimate.is_trustworthy, estimate.reason) == (True, '')
     assert estimate.case is case
     assert estimate.inertia == pytest.approx(INERTIA[case], rel=1e-12)
     assert estimate.stiffness == pytest.approx(plant.stiffness, rel=1e-6)
@@ -155,7 +155,7 @@ def test_standard_errors_are_those_of_many_trials(paper_arm, case, missing):
         kept = rng.random(t.size) >= missing
         noisy = q[kept] + NOISE * rng.standard_normal(q[kept].shape)
         estimate = estimate_of(t[kept], noisy, paper_arm)
-        assert estimate.trustworthy, estimate.reason
+        assert estimate.is_trustworthy, estimate.reason
         assert estimate.case is case
         scores.append(
             (
@@ -175,7 +175,7 @@ def test_noise_that_changes_slowly_is_given_its_due(paper_arm):
     for _ in range(100):
         noise = lfilter([1.0], [1.0, -memory], rng.standard_normal(q.shape), axis=0)
         estimate = estimate_of(t, q + NOISE * noise, paper_arm)
-        assert estimate.trustworthy, estimate.reason
+        assert estimate.is_trustworthy, estimate.reason
         scores.append((estimate.stiffness - plant.stiffness) / estimate.stiffness_std)
     # Taken for white, this noise would give 2.4.
     assert np.std(scores) == pytest.approx(1.0, abs=0.25)
@@ -189,7 +189,7 @@ def test_encoder_steps_do_no_harm(paper_arm, case, step):
         plant = plant_of(0.8 + 0.04 * number)
         t, q = swing(plant, case, amplitude=0.07, phase=0.5 * number)
         estimate = estimate_of(t, encoded(q, step, 0.3 + 0.1 * number), paper_arm)
-        assert estimate.trustworthy, estimate.reason
+        assert estimate.is_trustworthy, estimate.reason
         assert estimate.case is case
         assert estimate.stiffness == pytest.approx(plant.stiffness, rel=2e-3)
         assert estimate.damping == pytest.approx(plant.damping, rel=0.03)
@@ -221,7 +221,7 @@ def test_below_the_noise_nothing_is_claimed(paper_arm, amplitude, reason):
     t, q = swing(plant_of(1.1), ActuatedJoints.FREE, amplitude)
     for _ in range(20):
         estimate = estimate_of(t, q + NOISE * rng.standard_normal(q.shape), paper_arm)
-        assert not estimate.trustworthy
+        assert not estimate.is_trustworthy
         assert reason in estimate.reason
 
 
@@ -232,7 +232,7 @@ def test_a_given_case_is_not_doubted(paper_arm, joints):
     q = q + np.array((1e-3, 1e-5)) * rng.standard_normal(q.shape)
     assert 'noise hides' in estimate_of(t, q, paper_arm).reason
     estimate = estimate_of(t, q, paper_arm, joints)
-    assert estimate.trustworthy
+    assert estimate.is_trustworthy
     assert estimate.case is joints
     assert estimate.stiffness == pytest.approx(plant.stiffness, abs=4 * estimate.stiffness_std)
 
@@ -242,7 +242,7 @@ def test_a_joint_that_is_neither_free_nor_held_is_not_guessed(paper_arm, share):
     ratio = share * RATIO[ActuatedJoints.FREE]
     t, q = swing(plant_of(1.1), ActuatedJoints.FREE, ratio=ratio)
     estimate = estimate_of(t, q, paper_arm)
-    assert not estimate.trustworthy
+    assert not estimate.is_trustworthy
     assert estimate.case is None
     assert 'neither free nor held' in estimate.reason
 
@@ -253,7 +253,7 @@ def test_where_the_cases_agree_noise_does_not_matter():
     last = 0.02 * np.exp(-0.5 * t) * np.cos(10.0 * t)
     q = np.stack((-1e-3 * last, last), axis=-1) + 1e-3 * rng.standard_normal((t.size, 2))
     estimate = estimate_of(t, q, nominal)
-    assert estimate.trustworthy, estimate.reason
+    assert estimate.is_trustworthy, estimate.reason
     assert estimate.stiffness == pytest.approx(0.1, rel=0.01)
 
 
@@ -276,7 +276,7 @@ def test_what_is_no_such_oscillation_is_refused(paper_arm, signal, reason):
     t = np.arange(0.0, WINDOW, 1.0 / RATE)
     q = np.stack((np.zeros_like(t), signal(t)), axis=-1)
     estimate = estimate_of(t, q, paper_arm)
-    assert not estimate.trustworthy
+    assert not estimate.is_trustworthy
     assert reason in estimate.reason
 
 
@@ -302,7 +302,7 @@ def test_an_undamped_arm_has_no_negative_damping(paper_arm, case):
         estimate_of(t, q + noise * rng.standard_normal(q.shape), paper_arm)
         for noise in [0.0] + 20 * [NOISE]
     ]
-    assert all(estimate.trustworthy for estimate in estimates)
+    assert all(estimate.is_trustworthy for estimate in estimates)
     assert min(estimate.damping for estimate in estimates) == 0.0
     assert all(e.damping <= 4 * e.damping_std + 1e-12 for e in estimates)
 

@@ -17,8 +17,8 @@
 from dataclasses import replace
 from math import inf, pi
 
-from flat_planner_ros.core.arm.joint_sample import JointSample
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.arm.samples import JointSample
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import extrema_of, Quantity

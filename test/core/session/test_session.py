@@ -19,8 +19,8 @@ from math import inf, nan, pi
 
 from core.conftest import envelope
 from flat_planner_ros.core.arm.errors import InvalidRequest
-from flat_planner_ros.core.arm.joint_sample import JointSample
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.arm.samples import JointSample
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.duration_rules import OnViolation
 from flat_planner_ros.core.planning.limits import JointLimits

@@ -639,7 +639,7 @@ def test_every_level_has_its_diagnostic_and_unknown_values_are_left_out():
     motion = PlannedMotion(
         joint_names=JOINTS, start=1.0, times=np.array((0.0, 1.0)), positions=np.zeros((2, 2))
     )
-    monitor.plan(motion)
+    monitor.watch(motion)
     monitor.add(JointSample(time=1.0, positions=np.zeros(2)))
     (report,) = monitor.tick(2.5)
     for level in Level:

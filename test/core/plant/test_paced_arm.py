@@ -26,9 +26,8 @@ from flat_planner_ros.core.plant.paced_arm import (
     MAX_CATCH_UP,
     PacedArm,
 )
-from flat_planner_ros.core.plant.rollout import rollout
-from flat_planner_ros.core.plant.sensing import Sensing
-from flat_planner_ros.core.plant.settings import SimulationSettings
+from flat_planner_ros.core.plant.settings import Sensing, SimulationSettings
+from flat_planner_ros.core.plant.simulation import rollout
 import numpy as np
 import pytest
 
@@ -77,7 +76,7 @@ def test_samples_lie_on_an_even_grid_however_the_clock_is_read():
     assert np.diff(times) == pytest.approx(1.0 / SETTINGS.rate, abs=3e-7)
     assert times[0] == pytest.approx(EPOCH, abs=1.0 / SETTINGS.rate)
     assert times[-1] <= now
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 def test_the_motion_does_not_depend_on_how_the_clock_is_read():
@@ -141,7 +140,7 @@ def test_a_short_lag_is_made_up_for():
     samples = lagging.follow(lagging.time + 0.9)
     assert len(samples) == 180
     assert np.array_equal(last(samples), last(expected))
-    assert lagging.take_troubles() == []
+    assert lagging.take_warnings() == []
 
 
 def test_a_long_lag_is_skipped_and_told():
@@ -159,11 +158,11 @@ def test_a_long_lag_is_skipped_and_told():
     )
     assert before.effort[0] != 0.0
     assert {sample.effort[0] for sample in after + arm.follow(now + 1.0)} == {0.0}
-    (trouble,) = arm.take_troubles()
+    (trouble,) = arm.take_warnings()
     assert 's skipped' in trouble
     assert 'dropped' in trouble
     assert float(trouble.split()[0]) == pytest.approx(MAX_CATCH_UP + 7.0, abs=0.006)
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 def test_nothing_is_applied_after_a_command_that_ended_in_a_skipped_time():
@@ -191,7 +190,7 @@ def test_a_clock_set_back_keeps_the_state_and_drops_the_command():
     samples = after + arm.follow(1.45)
     assert samples[0].position == pytest.approx(before.position, abs=0.05)
     assert {sample.effort[0] for sample in samples} == {0.0}
-    assert 'set back by 1.600 s' in arm.take_troubles()[0]
+    assert 'set back by 1.600 s' in arm.take_warnings()[0]
 
 
 def test_a_clock_that_hesitates_is_waited_for():
@@ -201,7 +200,7 @@ def test_a_clock_that_hesitates_is_waited_for():
     samples = arm.follow(2.11)
     assert [s.time for s in samples] == pytest.approx([2.105, 2.11])
     assert samples[-1].effort[0] == pytest.approx(swing().effort(2.11)[0])
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 @pytest.mark.parametrize('factor', [0.5, 1.0, 5.0])
@@ -211,7 +210,7 @@ def test_a_leading_arm_keeps_its_speed(factor):
     assert samples[0].time == 1.0
     assert arm.time == pytest.approx(1.0 + 2.0 * factor, abs=2 * SETTINGS.step)
     assert np.diff([s.time for s in samples]) == pytest.approx(1.0 / SETTINGS.rate, abs=1e-12)
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 def test_a_leading_arm_makes_up_for_a_pause_little_by_little():
@@ -220,7 +219,7 @@ def test_a_leading_arm_makes_up_for_a_pause_little_by_little():
     for wall in 0.8 + np.linspace(0.0, 0.2, 41):
         assert len(arm.lead(wall, 1.0)) <= BATCH * SETTINGS.rate + 1
     assert arm.time == pytest.approx(2.0, abs=2 * SETTINGS.step)
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 def test_a_leading_arm_that_is_too_slow_lets_time_run_slower_and_says_so():
@@ -228,10 +227,10 @@ def test_a_leading_arm_that_is_too_slow_lets_time_run_slower_and_says_so():
     for wall in np.arange(0.0, 10.0, 1.0):
         arm.lead(wall, 1.0)
     assert arm.time == pytest.approx(1.0 + 9 * BATCH, abs=1e-9)
-    (trouble,) = arm.take_troubles()
+    (trouble,) = arm.take_warnings()
     assert 'behind its real_time_factor' in trouble
     assert float(trouble.split()[4]) == pytest.approx(9.0 - 9 * BATCH - MAX_CATCH_UP, abs=1e-3)
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 @pytest.mark.parametrize('factor', [0.1, 1.0, 5.0, 20.0, 1000.0])
@@ -247,7 +246,7 @@ def test_as_fast_as_it_can_is_a_batch_per_call():
     for k in range(1, 4):
         arm.lead(0.0, 0.0)
         assert arm.time == pytest.approx(1.0 + k * BATCH)
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
 
 
 def test_a_late_command_is_played_from_the_present_and_remarked():
@@ -288,7 +287,7 @@ def test_a_command_that_begins_after_a_skipped_time_is_kept():
     arm.follow(1.0)
     arm.command(swing(start))
     arm.follow(9.0)
-    assert 'dropped' not in arm.take_troubles()[0]
+    assert 'dropped' not in arm.take_warnings()[0]
     samples = arm.follow(9.9) + arm.follow(10.5)
     assert samples[-1].effort[0] == pytest.approx(swing(start).effort(samples[-1].time)[0])
 
@@ -351,18 +350,18 @@ def test_efforts_without_measure_stop_the_arm_in_finite_numbers(effort):
     samples = lead_to(arm, 3.0)
     assert np.isfinite([np.concatenate(sample[1:]) for sample in samples]).all()
     if effort < 1e3:
-        assert arm.take_troubles() == []
+        assert arm.take_warnings() == []
         return
     assert not samples[-1].velocity.any()
     assert samples[-1].effort[0] == 0.0
     for _ in range(2):  # said again until something is done about it
-        (trouble,) = arm.take_troubles()
+        (trouble,) = arm.take_warnings()
         assert 'has been stopped until it is reset: joint' in trouble
     for act in (lambda: arm.command(swing(4.0)), lambda: arm.hold([0.0])):
         with pytest.raises(InvalidCommand, match='stopped until it is reset'):
             act()
     arm.reset()
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
     arm.command(swing(4.0))
     assert lead_to(arm, 5.0)[-1].position[0] != 0.0
 
@@ -372,7 +371,7 @@ def test_gains_or_friction_too_large_for_the_step_stop_the_arm_too():
     arm = PacedArm(stiff, 1.0)
     arm.command(located(1.0, 1e-3))
     assert np.isfinite([np.concatenate(s[1:]) for s in lead_to(arm, 2.0)]).all()
-    assert 'gains for steps of 0.001 s' in arm.take_troubles()[0]
+    assert 'gains for steps of 0.001 s' in arm.take_warnings()[0]
 
 
 def test_a_stream_of_efforts_is_applied_as_it_comes():
@@ -382,7 +381,7 @@ def test_a_stream_of_efforts_is_applied_as_it_comes():
         samples = lead_to(arm, arm.time + 0.05)
         assert {sample.effort[0] for sample in samples[1:]} == {effort}
     lead_to(arm, 3.0)
-    assert arm.take_troubles() == []  # it ended with zeros
+    assert arm.take_warnings() == []  # it ended with zeros
 
 
 def test_a_stream_that_breaks_ends_in_no_effort_and_one_complaint():
@@ -391,10 +390,10 @@ def test_a_stream_that_breaks_ends_in_no_effort_and_one_complaint():
     samples = lead_to(arm, 2.0)
     applied = [sample.time for sample in samples if sample.effort[0]]
     assert max(applied) == pytest.approx(1.095)
-    (trouble,) = arm.take_troubles()
+    (trouble,) = arm.take_warnings()
     assert 'none came for 0.1 s' in trouble
     lead_to(arm, 3.0)
-    assert arm.take_troubles() == []
+    assert arm.take_warnings() == []
     expected = rollout(
         PAPER,
         EffortProfile(start=0.0, times=[0.0, 0.1, 0.1 + 1e-9], efforts=[[2e-3], [2e-3], [0.0]]),
@@ -470,7 +469,7 @@ def test_clipped_steps_are_counted():
     arm = moving(1.0, replace(SETTINGS, saturation=(5e-4,)))
     samples = lead_to(arm, 3.5)
     assert max(abs(sample.effort[0]) for sample in samples) == 5e-4
-    (trouble,) = arm.take_troubles()
+    (trouble,) = arm.take_warnings()
     assert trouble.startswith('effort clipped')
     # The sine is above half its peak for two thirds of its two seconds.
     assert int(trouble.split()[-2]) == pytest.approx(2000 * 2 / 3, abs=5)

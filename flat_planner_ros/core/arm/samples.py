@@ -12,12 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Motion between sampled points: what a plan or a command asks for at any time."""
+"""Motion in samples: one that drivers measure, and what lies between those of a plan."""
 
 from bisect import bisect_right
+from dataclasses import dataclass
 
 from flat_planner_ros.core.arm.arrays import FloatArray
 import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class JointSample:
+    """
+    Measured state of the n joints, in the order of the motion's names.
+
+    Attributes
+    ----------
+    time
+        Absolute time of the measurement [s].
+    positions
+        Joint positions [rad], shape (n,); NaN if unknown.
+    velocities, efforts
+        Joint velocities [rad/s] and efforts [N m], shape (n,); ``None`` or NaN if unknown.
+
+    """
+
+    time: float
+    positions: FloatArray
+    velocities: FloatArray | None = None
+    efforts: FloatArray | None = None
 
 
 class SampledMotion:

@@ -15,9 +15,9 @@
 """Rigid bodies of links: alike to the arm in every pose, seen through plain kinematics."""
 
 from flat_planner_ros.core.arm.errors import InvalidModel
-from flat_planner_ros.core.arm.link_bodies import (
-    bodies_of_constants,
-    bodies_of_links,
+from flat_planner_ros.core.arm.links import (
+    bodies_from_links,
+    bodies_from_reduced,
     DRAWN_LENGTH,
 )
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
@@ -74,7 +74,7 @@ def assert_alike(bodies, arm, q):
 
 @pytest.mark.parametrize('drawn_length', [None, 0.02, 0.7])
 def test_the_papers_arm_is_realised_for_any_drawn_length(drawn_length):
-    bodies = bodies_of_constants(inertia_star=PAPER, drawn_length=drawn_length)
+    bodies = bodies_from_reduced(inertia_star=PAPER, drawn_length=drawn_length)
     arm = PlanarArm.reduced(inertia_star=PAPER, gravity=GRAVITY, **SPRING)
     assert bodies[0].length == (drawn_length or DRAWN_LENGTH)
     assert all(body.mass > 0.0 and body.inertia > 0.0 for body in bodies)
@@ -94,7 +94,7 @@ def test_the_reduced_form_of_three_joints_is_realised(first, tip, last, ratio, d
     names = ('link_length', 'link_com', 'link_mass', 'link_inertia')
     model = {name: [value] for name, value in zip(names, first, strict=True)}
     model |= {'inertia_star': (ratio * last, last), 'tip_mass': tip}
-    bodies = bodies_of_constants(**model, drawn_length=drawn)
+    bodies = bodies_from_reduced(**model, drawn_length=drawn)
     arm = PlanarArm.reduced(**model, gravity=GRAVITY, **SPRING)
     assert bodies[1].mass + bodies[2].mass == pytest.approx(tip, rel=1e-12)
     assert min(body.mass for body in bodies) > 0.0
@@ -111,7 +111,7 @@ def test_the_full_form_is_realised_balanced_or_not(links, weights, arms, angle):
     names = ('link_length', 'link_com', 'link_mass', 'link_inertia')
     model = dict(zip(names, map(list, zip(*links, strict=True)), strict=True))
     model |= {'counterbalance_mass': weights, 'counterbalance_arm': arms}
-    bodies = bodies_of_links(**model)
+    bodies = bodies_from_links(**model)
     arm = PlanarArm.from_links(**model, gravity=GRAVITY, **SPRING)
     assert_alike(bodies, arm, angle * np.arange(1, len(links) + 1))
 
@@ -124,7 +124,7 @@ def test_without_a_tip_mass_the_last_links_have_inertia_alone():
         'link_mass': [0.5],
         'link_inertia': [1e-3],
     }
-    bodies = bodies_of_constants(**model)
+    bodies = bodies_from_reduced(**model)
     assert [body.mass for body in bodies] == [0.5, 0.0, 0.0]
     assert_alike(bodies, PlanarArm.reduced(**model, gravity=9.81, **SPRING), np.array([1, 2, 3.0]))
 
@@ -135,4 +135,4 @@ def test_without_a_tip_mass_the_last_links_have_inertia_alone():
 )
 def test_what_is_no_arm_is_refused(model):
     with pytest.raises(InvalidModel, match='must'):
-        bodies_of_constants(**model)
+        bodies_from_reduced(**model)

@@ -15,7 +15,7 @@
 """Sensors add what they are told to, repeatably, and leave the true motion alone."""
 
 from flat_planner_ros.core.arm.errors import InvalidModel
-from flat_planner_ros.core.plant.sensing import Sensing, Sensor
+from flat_planner_ros.core.plant.settings import Sensing, Sensor
 from flat_planner_ros.core.plant.simulation import ArmState
 import numpy as np
 import pytest
