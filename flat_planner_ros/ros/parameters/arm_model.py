@@ -150,7 +150,9 @@ def _check_flat(arm: PlanarArm, links: Mapping[str, Any]) -> None:
     try:
         arm.check_flat()
     except NotFlat as error:
-        mended = suggest_counterbalances(**{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'})
+        mended = suggest_counterbalances(
+            **{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'}
+        )
         raise NotFlat(error.link, error.static_moment, f'{error}; {mended}') from error
 
 
