@@ -19,9 +19,11 @@ J = integral of Y^T Q Y over the motion, Y = (y', y'', ..., y^(6)) and Q66 = 1
 ((16) of docs/derivation.md).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, InitVar
 from enum import Enum
 from functools import cache
+from typing import Self
 
 from flat_planner_ros.core.arm import FlatMap, FloatArray, InvalidCost
 import numpy as np
@@ -46,17 +48,6 @@ SEMIDEFINITE_TOLERANCE = 1e-10
 
 SYMMETRY_TOLERANCE = 1e-12
 """Largest difference of Q_ij and Q_ji relative to sqrt(Q_ii Q_jj) [-]."""
-
-
-class Strategy(Enum):
-    """Named costs of the paper, one's own, and the trade of `insensitive`."""
-
-    POLYNOMIAL = 'polynomial'
-    MIN_CONTROL_EFFORT = 'min_control_effort'
-    MIN_POTENTIAL_ENERGY = 'min_potential_energy'
-    MIXED = 'mixed'
-    CUSTOM = 'custom'
-    INSENSITIVE = 'insensitive'
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -116,65 +107,6 @@ class QuadraticCost:
         return coefficients
 
 
-def strategy_cost(
-    strategy: Strategy,
-    flat_map: FlatMap,
-    *,
-    r: float = 0.0,
-    p: float = 0.0,
-    custom: FloatArray | None = None,
-) -> QuadraticCost:
-    """
-    Return the cost of a strategy.
-
-    Parameters
-    ----------
-    strategy
-        Which of the named costs.
-    flat_map
-        Flat map of the arm, whose effort row is weighted by r.
-    r
-        Weight of the squared effort, raised to the power of 8 [(N m)^(-1/4) s^(-3/2) rad^(1/4)].
-    p
-        Weight of the squared acceleration, raised to the power of 8 [1/s].
-    custom
-        Q of the strategy `custom`, shape (6, 6).
-
-    Raises
-    ------
-    InvalidCost
-        A weight outside [0, MAX_WEIGHT], or an inadmissible Q.
-
-    References
-    ----------
-    (17) to (19) of docs/derivation.md; `eq:mintau`, `eq:minpot` of the paper.
-
-    """
-    for name, weight in (('r', r), ('p', p)):
-        if not 0.0 <= weight <= MAX_WEIGHT:
-            raise InvalidCost(f'weight {name} = {weight:g} is outside [0, {MAX_WEIGHT:g}]')
-    if strategy is Strategy.CUSTOM:
-        if custom is None:
-            raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')
-        return QuadraticCost(matrix=custom)
-    matrix = np.zeros((ORDER, ORDER))
-    if strategy in (Strategy.MIN_CONTROL_EFFORT, Strategy.MIXED):
-        effort = flat_map.effort[1:]
-        with np.errstate(over='ignore', invalid='ignore'):
-            weighted = r ** (WEIGHT_EXPONENT // 2) * effort
-        largest = float(np.abs(weighted).max())
-        if not largest < MAX_FACTOR:
-            raise InvalidCost(
-                f'effort weighted with r = {r:g} is up to {largest:.3g}, beyond {MAX_FACTOR:g}: '
-                f'the model has numbers that no arm has'
-            )
-        matrix[: len(effort), : len(effort)] = np.multiply.outer(weighted, weighted)
-    if strategy in (Strategy.MIN_POTENTIAL_ENERGY, Strategy.MIXED):
-        matrix[1, 1] += p**WEIGHT_EXPONENT
-    matrix[-1, -1] = 1.0
-    return QuadraticCost(matrix=matrix, is_sum_of_squares=True)
-
-
 @cache
 def _antidiagonals() -> FloatArray:
     """Return the matrix that takes Q row by row to the sums of (-1)^i Q_ij over i + j = 2k."""
@@ -218,3 +150,113 @@ def _check_semidefinite(matrix: FloatArray) -> None:
             f'Q must be positive semidefinite, but scaled to unit diagonal it has '
             f'the eigenvalue {smallest:.3g}'
         )
+
+
+def effort_square(flat_map: FlatMap, r: float, p: float) -> FloatArray:
+    """Return Q of the squared effort, weighted with r^8, (18) of docs/derivation.md."""
+    del p
+    effort = flat_map.effort[1:]
+    with np.errstate(over='ignore', invalid='ignore'):
+        weighted = r ** (WEIGHT_EXPONENT // 2) * effort
+    largest = float(np.abs(weighted).max())
+    if not largest < MAX_FACTOR:
+        raise InvalidCost(
+            f'effort weighted with r = {r:g} is up to {largest:.3g}, beyond {MAX_FACTOR:g}: '
+            f'the model has numbers that no arm has'
+        )
+    matrix = np.zeros((ORDER, ORDER))
+    matrix[: len(effort), : len(effort)] = np.multiply.outer(weighted, weighted)
+    return matrix
+
+
+def acceleration_square(flat_map: FlatMap, r: float, p: float) -> FloatArray:
+    """Return Q of the squared acceleration, weighted with p^8, (19) of docs/derivation.md."""
+    del flat_map, r
+    matrix = np.zeros((ORDER, ORDER))
+    matrix[1, 1] = p**WEIGHT_EXPONENT
+    return matrix
+
+
+Square = Callable[[FlatMap, float, float], FloatArray]
+
+
+class Strategy(Enum):
+    """
+    Named costs of the paper, one's own, and the trade of `insensitive`.
+
+    The cost is the integral of the squared sixth derivative and of the squares in the row. A new
+    strategy is a row here and a `Square`, a function as the ones above, for what is new in it; the
+    parameter `strategy`, the programs and their texts find it by its name.
+
+    Attributes
+    ----------
+    squares
+        What is minimised besides the sixth derivative.
+
+    """
+
+    POLYNOMIAL = 'polynomial'
+    MIN_CONTROL_EFFORT = 'min_control_effort', effort_square
+    MIN_POTENTIAL_ENERGY = 'min_potential_energy', acceleration_square
+    MIXED = 'mixed', effort_square, acceleration_square
+    # Takes Q from the request.
+    CUSTOM = 'custom'
+    # Shapes one joint's effort; the others, and starts in motion, have the polynomial law.
+    INSENSITIVE = 'insensitive'
+
+    squares: tuple[Square, ...]
+
+    def __new__(cls, name: str, *squares: Square) -> Self:
+        """Return a member whose value is its name."""
+        member = object.__new__(cls)
+        member._value_ = name
+        member.squares = squares
+        return member
+
+
+def strategy_cost(
+    strategy: Strategy,
+    flat_map: FlatMap,
+    *,
+    r: float = 0.0,
+    p: float = 0.0,
+    custom: FloatArray | None = None,
+) -> QuadraticCost:
+    """
+    Return the cost of a strategy.
+
+    Parameters
+    ----------
+    strategy
+        Which of the named costs.
+    flat_map
+        Flat map of the arm, whose effort row is weighted by r.
+    r
+        Weight of the squared effort, raised to the power of 8 [(N m)^(-1/4) s^(-3/2) rad^(1/4)].
+    p
+        Weight of the squared acceleration, raised to the power of 8 [1/s].
+    custom
+        Q of the strategy `custom`, shape (6, 6).
+
+    Raises
+    ------
+    InvalidCost
+        A weight outside [0, MAX_WEIGHT], or an inadmissible Q.
+
+    References
+    ----------
+    (17) to (19) of docs/derivation.md; `eq:mintau`, `eq:minpot` of the paper.
+
+    """
+    for name, weight in (('r', r), ('p', p)):
+        if not 0.0 <= weight <= MAX_WEIGHT:
+            raise InvalidCost(f'weight {name} = {weight:g} is outside [0, {MAX_WEIGHT:g}]')
+    if strategy is Strategy.CUSTOM:
+        if custom is None:
+            raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')
+        return QuadraticCost(matrix=custom)
+    matrix = np.zeros((ORDER, ORDER))
+    for square in strategy.squares:
+        matrix += square(flat_map, r, p)
+    matrix[-1, -1] = 1.0
+    return QuadraticCost(matrix=matrix, is_sum_of_squares=True)
