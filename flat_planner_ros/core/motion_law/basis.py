@@ -28,13 +28,11 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
 from flat_planner_ros.core.motion_law.terms import leibniz, Number, series_derivatives, Term
 import numpy as np
 from numpy.typing import NDArray
-
-ComplexArray = NDArray[np.complex128]
 
 CONDITIONS = 6
 """Conditions at either end: the value and five derivatives."""

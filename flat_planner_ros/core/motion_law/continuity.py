@@ -23,7 +23,6 @@ each condition keeps its own scale.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
@@ -58,36 +57,51 @@ class Amplitudes(NamedTuple):
     correction: FloatArray
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class ContinuitySystem:
     """
     The conditions on p segments, as blocks of one matrix.
 
-    Attributes
+    At every knot they are the values of the segments before and after it, continuity of the
+    derivatives 1 to 9, and that of w^(10) + relaxation w^(11); at both ends, derivatives 0 to 5.
+
+    Parameters
     ----------
-    ends
-        Derivatives 0 to 6 of every solution at its segment's start and end, shape (p, 2, 7, 12).
-    start, end
-        Derivatives 0 to 5 at both ends, on the first and the last segment, shape (6, 12).
-    knots
-        Conditions at every knot, on the segments before and after it, shape
-        (p - 1, 12, 24): the two values, continuity of the derivatives 1 to 9, and that of
-        w^(10) + relaxation w^(11).
-    start_factors, knot_factors, end_factors
-        By which the conditions have been multiplied, shapes (6,), (p - 1, 12), (6,).
-    column_factors
-        By which the amplitudes have been divided, shape (p, 12).
+    bases
+        Solutions of every segment.
+    halves
+        Half the segments' lengths, shape (p,) [s].
+    relaxation
+        Via points prescribe w + relaxation w' [s].
 
     """
 
-    ends: FloatArray
-    start: FloatArray
-    knots: FloatArray
-    end: FloatArray
-    start_factors: FloatArray
-    knot_factors: FloatArray
-    end_factors: FloatArray
-    column_factors: FloatArray
+    def __init__(
+        self, bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: float
+    ) -> None:
+        """Fill the blocks and scale their rows, then their columns, to the same size."""
+        powers = halves[:, None] ** -np.arange(float(SOLUTIONS))
+        at_start = np.array([basis.at_start for basis in bases]) * powers[:, :, None]
+        at_end = np.array([basis.at_end for basis in bases]) * powers[:, :, None]
+        rates = np.array([basis.rates for basis in bases]) / halves[:, None]
+        self._start_factors = _end_factors(rates[0])
+        self._end_factors = _end_factors(rates[-1])
+        # The faster segment's rates: only it can fulfil the conditions on high derivatives.
+        self._knot_factors = _knot_factors(np.maximum(rates[:-1], rates[1:]))
+        start = at_start[0, :CONDITIONS] * self._start_factors[:, None]
+        end = at_end[-1, :CONDITIONS] * self._end_factors[:, None]
+        knots = np.zeros((len(bases) - 1, SOLUTIONS, 2 * SOLUTIONS))
+        _fill_knots(knots[:, :, :SOLUTIONS], at_end[:-1], relaxation, 0)
+        _fill_knots(knots[:, :, SOLUTIONS:], -at_start[1:], relaxation, 1)
+        knots *= self._knot_factors[:, :, None]
+        columns = 1.0 / _largest(start, knots, end)
+        knots[:, :, :SOLUTIONS] *= columns[:-1, None]
+        knots[:, :, SOLUTIONS:] *= columns[1:, None]
+        self._column_factors = columns  # (p, 12)
+        self._start = start * columns[0]  # (6, 12)
+        self._knots = knots  # (p - 1, 12, 24)
+        self._end = end * columns[-1]  # (6, 12)
+        # Derivatives 0 to 6 of every solution at its segment's start and end, (p, 2, 7, 12).
+        self._at_ends = np.stack([at_start, at_end], axis=1)[:, :, : CONDITIONS + 1]
 
     def solve(self, start: FloatArray, steps: FloatArray) -> Amplitudes:
         """
@@ -117,26 +131,26 @@ class ContinuitySystem:
             residual = target - self._applied(amplitudes)
             change, _ = dgbtrs(factors, BAND, BAND, residual, pivots)
             amplitudes += change
-        at_ends = self.ends @ self._unscaled(change)[:, None]
+        at_ends = self._at_ends @ self._unscaled(change)[:, None]
         return Amplitudes(self._unscaled(amplitudes), np.abs(at_ends).max(axis=(0, 1)))
 
     def _unscaled(self, amplitudes: FloatArray) -> FloatArray:
         """Return amplitudes of the solutions themselves, shape (p, 12, m)."""
-        columns = amplitudes.reshape(*self.column_factors.shape, -1)
-        unscaled: FloatArray = columns * self.column_factors[:, :, None]
+        columns = amplitudes.reshape(*self._column_factors.shape, -1)
+        unscaled: FloatArray = columns * self._column_factors[:, :, None]
         return unscaled
 
     def _target(self, start: FloatArray, steps: FloatArray) -> FloatArray:
         """Return the right-hand side, shape (12 p, m)."""
         target = np.zeros((SOLUTIONS * len(steps), steps.shape[1]))
-        target[1:CONDITIONS] = start * self.start_factors[1:, None]
-        target[CONDITIONS:-CONDITIONS:SOLUTIONS] = steps[:-1] * self.knot_factors[:, :1]
-        target[-CONDITIONS] = steps[-1] * self.end_factors[0]
+        target[1:CONDITIONS] = start * self._start_factors[1:, None]
+        target[CONDITIONS:-CONDITIONS:SOLUTIONS] = steps[:-1] * self._knot_factors[:, :1]
+        target[-CONDITIONS] = steps[-1] * self._end_factors[0]
         return target
 
     def _banded(self) -> FloatArray:
         """Return the matrix by diagonals, with room for the rows that pivoting exchanges."""
-        size = self.column_factors.size
+        size = self._column_factors.size
         banded = np.zeros((3 * BAND + 1, size), order='F')
 
         def put(block: FloatArray, row: int, column: int) -> None:
@@ -144,70 +158,30 @@ class ContinuitySystem:
             columns = column + np.arange(block.shape[1])
             banded[2 * BAND + rows - columns, columns] = block
 
-        put(self.start, 0, 0)
-        for index, block in enumerate(self.knots):
+        put(self._start, 0, 0)
+        for index, block in enumerate(self._knots):
             put(block, CONDITIONS + SOLUTIONS * index, SOLUTIONS * index)
-        put(self.end, size - CONDITIONS, size - SOLUTIONS)
+        put(self._end, size - CONDITIONS, size - SOLUTIONS)
         return banded
 
     def _applied(self, amplitudes: FloatArray) -> FloatArray:
         """Return the matrix times some columns, shape (12 p, m)."""
         columns = amplitudes.reshape(-1, SOLUTIONS, amplitudes.shape[1])
-        knots = self.knots[:, :, :SOLUTIONS] @ columns[:-1]
-        knots += self.knots[:, :, SOLUTIONS:] @ columns[1:]
+        knots = self._knots[:, :, :SOLUTIONS] @ columns[:-1]
+        knots += self._knots[:, :, SOLUTIONS:] @ columns[1:]
         inner = knots.reshape(-1, amplitudes.shape[1])
-        return np.concatenate([self.start @ columns[0], inner, self.end @ columns[-1]])
+        return np.concatenate([self._start @ columns[0], inner, self._end @ columns[-1]])
 
 
-def continuity_system(
-    bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: float
-) -> ContinuitySystem:
-    """
-    Return the conditions on the segments of a path.
-
-    Parameters
-    ----------
-    bases
-        Solutions of every segment.
-    halves
-        Half the segments' lengths, shape (p,) [s].
-    relaxation
-        Via points prescribe w + relaxation w' [s].
-
-    """
-    powers = halves[:, None] ** -np.arange(float(SOLUTIONS))
-    at_start = np.array([basis.at_start for basis in bases]) * powers[:, :, None]
-    at_end = np.array([basis.at_end for basis in bases]) * powers[:, :, None]
-    rates = np.array([basis.rates for basis in bases]) / halves[:, None]
-    start_factors, end_factors = _end_factors(rates[0]), _end_factors(rates[-1])
-    # The faster segment's rates: only it can fulfil the conditions on high derivatives.
-    knot_factors = _knot_factors(np.maximum(rates[:-1], rates[1:]))
-    start = at_start[0, :CONDITIONS] * start_factors[:, None]
-    end = at_end[-1, :CONDITIONS] * end_factors[:, None]
-    knots = np.zeros((len(bases) - 1, SOLUTIONS, 2 * SOLUTIONS))
-    _fill_knots(knots[:, :, :SOLUTIONS], at_end[:-1], relaxation, 0)
-    _fill_knots(knots[:, :, SOLUTIONS:], -at_start[1:], relaxation, 1)
-    knots *= knot_factors[:, :, None]
-    largest = np.zeros((len(bases), SOLUTIONS))
+def _largest(start: FloatArray, knots: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the largest entry of every column of the conditions, shape (p, 12)."""
     sizes = np.abs(knots).max(axis=1)
+    largest = np.zeros((len(knots) + 1, SOLUTIONS))
     largest[:-1] = sizes[:, :SOLUTIONS]
     np.maximum(largest[1:], sizes[:, SOLUTIONS:], out=largest[1:])
     np.maximum(largest[0], np.abs(start).max(axis=0), out=largest[0])
     np.maximum(largest[-1], np.abs(end).max(axis=0), out=largest[-1])
-    columns = 1.0 / largest
-    knots[:, :, :SOLUTIONS] *= columns[:-1, None]
-    knots[:, :, SOLUTIONS:] *= columns[1:, None]
-    ends = np.stack([at_start, at_end], axis=1)[:, :, : CONDITIONS + 1]
-    return ContinuitySystem(
-        ends=ends,
-        start=start * columns[0],
-        knots=knots,
-        end=end * columns[-1],
-        start_factors=start_factors,
-        knot_factors=knot_factors,
-        end_factors=end_factors,
-        column_factors=columns,
-    )
+    return largest
 
 
 def _fill_knots(half: FloatArray, table: FloatArray, relaxation: float, row: int) -> None:

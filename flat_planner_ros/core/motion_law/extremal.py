@@ -36,7 +36,7 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, block_of, combined, CONDITIONS
 from flat_planner_ros.core.motion_law.law import ExponentialLaw, half_quadrature, JET_ORDER
-from flat_planner_ros.core.motion_law.roots import Cluster, clusters
+from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
 
@@ -84,11 +84,11 @@ class BoundaryConditions:
     end: FloatArray
 
 
-def extremal(
-    coefficients: FloatArray, duration: float, jets: BoundaryConditions
-) -> ExponentialLaw:
+def extremals(
+    coefficients: FloatArray, duration: float, conditions: Sequence[BoundaryConditions]
+) -> list[ExponentialLaw]:
     """
-    Return the stationary motion law with given ends.
+    Return the stationary laws of one equation that meet boundary conditions, one for each.
 
     Parameters
     ----------
@@ -96,9 +96,9 @@ def extremal(
         a_0 ... a_6 of the Euler-Lagrange equation in physical time, as given by
         `QuadraticCost.characteristic`, shape (7,) [s^(2k - 12)].
     duration
-        Length of the motion [s].
-    jets
-        What the law must meet.
+        Length of the motions [s].
+    conditions
+        What each law must meet.
 
     Raises
     ------
@@ -106,19 +106,12 @@ def extremal(
         The boundary conditions are singular in double precision.
 
     """
-    return extremals(coefficients, duration, [jets])[0]
-
-
-def extremals(
-    coefficients: FloatArray, duration: float, jets: Sequence[BoundaryConditions]
-) -> list[ExponentialLaw]:
-    """Return the stationary laws of one equation for several pairs of ends, as `extremal`."""
     half = 0.5 * duration
     powers = half**_ORDERS
-    found = clusters(coefficients * powers[::-1] ** 2)
+    found = Spectrum(coefficients * powers[::-1] ** 2).clusters()
     solvers: dict[float, _BoundarySolver] = {}
     laws = []
-    for ends in jets:
+    for ends in conditions:
         start = ends.start * powers[:CONDITIONS]
         end = ends.end * powers[:CONDITIONS]
         middle = 0.5 * (ends.start[0] + ends.end[0])
@@ -356,7 +349,7 @@ def kept_units(key: bytes) -> list[UnitMotion]:
 
 def unit_terms(coefficients: FloatArray) -> tuple[Term, ...]:
     """Return the terms of the stationary law from rest at -1/2 to rest at 1/2; it is odd."""
-    return tuple(_BoundarySolver(clusters(coefficients), -1.0).terms(_UNIT_ENDS[:, 1]))
+    return tuple(_BoundarySolver(Spectrum(coefficients).clusters(), -1.0).terms(_UNIT_ENDS[:, 1]))
 
 
 def _certified(coefficients: FloatArray) -> UnitMotion:

@@ -28,12 +28,10 @@ from itertools import pairwise
 from math import ceil, log2
 from typing import Protocol, Self
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.terms import Term, term_sum, TermSum, TOP_ORDER
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-ComplexArray = NDArray[np.complex128]
+from numpy.typing import ArrayLike
 
 JET_ORDER = 6
 """Highest derivative of the planned variable that joint motions and the flat plan need."""

@@ -31,7 +31,7 @@ from flat_planner_ros.core.motion_law.basis import (
     SegmentBasis,
     SOLUTIONS,
 )
-from flat_planner_ros.core.motion_law.continuity import Amplitudes, continuity_system
+from flat_planner_ros.core.motion_law.continuity import Amplitudes, ContinuitySystem
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
 from flat_planner_ros.core.motion_law.extremal import costate, rounded, stationarity_residual
 from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE, PiecewiseLaw
@@ -115,6 +115,7 @@ class OptimalPath:
     optimality_residual: float
 
 
+@strict_arithmetic()
 def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
     """
     Return the laws of least cost through a path, to be judged by their residuals.
@@ -127,12 +128,6 @@ def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
         The numbers leave double precision.
 
     """
-    with strict_arithmetic():
-        return _optimal_path(cost, path)
-
-
-def _optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
-    """Return the laws of least cost; numbers out of range are errors."""
     coefficients = cost.characteristic()
     halves = 0.5 * np.diff(path.edges)
     powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
@@ -177,22 +172,23 @@ def _certified(
     """Return one variable's law with its share of the cost and the residuals of its jets."""
     coefficients = cost.characteristic()
     relaxation = float(path.relaxations[variable])
-    # Constant along each segment: taken in its middle.
-    costates = np.array([costate(coefficients, jet[:, -1:])[0] for jet in jets])
-    knots = np.array([jet[:, 1] for jet in jets[:-1]]).reshape(-1, SOLUTIONS + 1)
     peaks = _peaks(path.start[variable, 0], jets)
     if not peaks.max() < MAX_DERIVATIVE:
         raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
+    # Constant along each segment: taken in its middle.
+    costates = np.array([costate(coefficients, jet[:, -1:])[0] for jet in jets])
+    ends = np.array([jet[:, :2].T for jet in jets])  # (p, 2, 13)
+    before = ends[:-1, 1]
     return OptimalPath(
         laws=(PiecewiseLaw(edges=path.edges, laws=laws),),
         cost_value=float(costates @ steps - _share_of_start(cost, jets[0][:, 0])),
-        time_slopes=2.0 * np.diff(costates) * (knots[:, 1] + relaxation * knots[:, 2]),
+        time_slopes=2.0 * np.diff(costates) * (before[:, 1] + relaxation * before[:, 2]),
         boundary_residual=max(
             _relative(correction, peaks[: CONDITIONS + 1]),
-            _boundary_residual(path, variable, jets, peaks[:CONDITIONS]),
+            _boundary_residual(path, variable, ends, peaks[:CONDITIONS]),
         ),
         optimality_residual=max(
-            _natural_residual(relaxation, jets, peaks),
+            _natural_residual(relaxation, ends[1:, 0] - before, peaks),
             *(stationarity_residual(coefficients, jet) for jet in jets),
         ),
     )
@@ -215,7 +211,7 @@ def _amplitudes(
     correction = np.empty((CONDITIONS + 1, len(steps)))
     for relaxation in np.unique(path.relaxations):
         alike = path.relaxations == relaxation
-        system = continuity_system(bases, halves, float(relaxation))
+        system = ContinuitySystem(bases, halves, float(relaxation))
         found = system.solve(path.start[alike, 1:].T, steps[alike].T)
         values[:, :, alike] = found.values
         correction[:, alike] = found.correction
@@ -240,31 +236,29 @@ def _near(depth: int) -> FloatArray:
 
 
 def _boundary_residual(
-    path: PathConditions, variable: int, jets: Sequence[FloatArray], peaks: FloatArray
+    path: PathConditions, variable: int, ends: FloatArray, peaks: FloatArray
 ) -> float:
     """Return the largest miss of a prescribed quantity or jump up to the fifth derivative."""
-    start, values = path.start[variable], path.values[variable]
-    relaxation = path.relaxations[variable]
-    left, right = _sides(jets)
+    values = path.values[variable]
     rest = np.append(values[-1], np.zeros(CONDITIONS - 1))
-    misses = [jets[0][:CONDITIONS, 0] - start, jets[-1][:CONDITIONS, 1] - rest]
-    misses += list((right - left)[:, :CONDITIONS])
+    before, after = ends[:-1, 1], ends[1:, 0]
+    misses = [ends[0, 0, :CONDITIONS] - path.start[variable], ends[-1, 1, :CONDITIONS] - rest]
+    misses += list((after - before)[:, :CONDITIONS])
     missed = np.abs(misses).max(axis=0)
-    for side in (left, right):
-        passed = side[:, 0] + relaxation * side[:, 1] - values[:-1]
+    for side in (before, after):
+        passed = side[:, 0] + path.relaxations[variable] * side[:, 1] - values[:-1]
         missed[0] = max(missed[0], np.abs(passed).max(initial=0.0))
     return _relative(missed, peaks)
 
 
-def _natural_residual(relaxation: float, jets: Sequence[FloatArray], peaks: FloatArray) -> float:
-    """Return the largest jump of a quantity that is continuous along an optimal path."""
-    left, right = _sides(jets)
-    jumps = np.abs(right - left)[:, CONDITIONS : SOLUTIONS - 1].max(axis=0, initial=0.0)
-    tied = (right - left)[:, SOLUTIONS - 2 : SOLUTIONS] @ [1.0, relaxation]
-    jumps[-1] = np.abs(tied).max(initial=0.0)
+def _natural_residual(relaxation: float, jumps: FloatArray, peaks: FloatArray) -> float:
+    """Return the largest jump at knots, (p - 1, 13), of what is continuous along the optimum."""
+    largest = np.abs(jumps)[:, CONDITIONS : SOLUTIONS - 1].max(axis=0, initial=0.0)
+    tied = jumps[:, SOLUTIONS - 2 : SOLUTIONS] @ [1.0, relaxation]
+    largest[-1] = np.abs(tied).max(initial=0.0)
     sizes = peaks[CONDITIONS : SOLUTIONS - 1].copy()
     sizes[-1] += relaxation * peaks[SOLUTIONS - 1]
-    return _relative(jumps, sizes)
+    return _relative(largest, sizes)
 
 
 def _peaks(start: float, jets: Sequence[FloatArray]) -> FloatArray:
@@ -275,13 +269,6 @@ def _peaks(start: float, jets: Sequence[FloatArray]) -> FloatArray:
     lowest[0] -= start
     peaks: FloatArray = np.maximum(highest, -lowest)
     return peaks
-
-
-def _sides(jets: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives before and after every via point, shape (p - 1, 13)."""
-    before = np.array([jet[:, 1] for jet in jets])[:-1]
-    after = np.array([jet[:, 0] for jet in jets])[1:]
-    return before, after
 
 
 def _relative(missed: FloatArray, sizes: FloatArray) -> float:

@@ -24,15 +24,14 @@ do not (docs/derivation.md, section 5).
 from cmath import sqrt
 from collections.abc import Iterable, Sequence
 from functools import cache, cached_property
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.motion_law.terms import Number
 import numpy as np
 from numpy.typing import NDArray
 
-ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
-Number = TypeVar('Number', np.float64, np.complex128)
 
 LINK = 2.5
 """Roots beta closer than this, in units of 2 / duration, share a cluster [-]."""
@@ -80,19 +79,6 @@ class Cluster(NamedTuple):
         return Cluster(centre=scale * self.centre, factor=self.factor * powers)
 
 
-def clusters(coefficients: FloatArray) -> list[Cluster]:
-    """
-    Return the characteristic roots of sum_k a_k D^(2k) in clusters.
-
-    Parameters
-    ----------
-    coefficients
-        a_0 ... a_6 in normalised time, a_0 = 0 and a_6 = 1, shape (7,) [-].
-
-    """
-    return Spectrum(coefficients).clusters(1.0)
-
-
 class Spectrum:
     """
     Characteristic roots of an equation in one unit of time, clustered in any other.
@@ -115,7 +101,7 @@ class Spectrum:
         self._alone = _polished_roots(self._reduced.tolist(), self._squares.tolist())
         self._grouped: dict[bytes, list[Cluster]] = {}
 
-    def clusters(self, scale: float) -> list[Cluster]:
+    def clusters(self, scale: float = 1.0) -> list[Cluster]:
         """Return the clusters of all roots multiplied by a positive factor."""
         if self._alone is not None:
             roots = self._alone if scale == 1.0 else [scale * beta for beta in self._alone]
@@ -143,21 +129,22 @@ class Spectrum:
         """Distances of all twelve +-beta, and those that their decay rates bridge."""
         both = np.concatenate([self._beta, -self._beta])
         decay = np.abs(both.real)
-        same_side = np.outer(both.real, both.real) > 0.0
-        relative = RELATIVE_LINK * np.minimum.outer(decay, decay) * same_side
-        return np.abs(both[:, None] - both[None, :]), relative
+        is_same_side = np.outer(both.real, both.real) > 0.0
+        bridged = np.where(is_same_side, RELATIVE_LINK * np.minimum.outer(decay, decay), 0.0)
+        return np.abs(both[:, None] - both[None, :]), bridged
 
     def _links(self, scale: float) -> BoolArray:
         """Return which of the twelve +-beta are close together, shape (12, 12)."""
-        distances, relative = self._distances
-        linked: BoolArray = distances <= np.maximum(LINK / scale, relative)
+        distances, bridged = self._distances
+        linked: BoolArray = distances <= np.maximum(LINK / scale, bridged)
         return linked
 
     def _of_groups(self, linked: BoolArray) -> list[Cluster]:
         """Return the clusters of linked roots, in the spectrum's own unit."""
         groups = _groups(self._beta, linked)
-        places, zeros = self._squares.tolist(), self._zeros
-        members = [[places[i - zeros] for i in group.members if i >= zeros] for group in groups]
+        zeros = self._zeros
+        squares = self._squares.tolist()
+        members = [[squares[i - zeros] for i in group.members if i >= zeros] for group in groups]
         central, *others = _factors(self._reduced[::-1].tolist(), members)
         around_zero = np.zeros(2 * (len(central) + zeros) - 1, dtype=complex)
         around_zero[: 2 * len(central) : 2] = central
@@ -203,7 +190,7 @@ def _are_apart(roots: list[complex]) -> bool:
         modulus = abs(beta)
         # Half the distance to its mirror image or its conjugate.
         near = 0.5 * max(PAIR_LINK, PAIR_RELATIVE_LINK * modulus)
-        if modulus <= LINK or beta.real <= near or 0.0 != beta.imag <= near:
+        if modulus <= LINK or beta.real <= near or 0.0 < beta.imag <= near:
             return False
         for other in roots[:i]:
             # The images of two roots are at least as far apart as they are in the quadrant.
@@ -258,7 +245,8 @@ def _groups(beta: ComplexArray, linked: BoolArray) -> list[_Group]:
     count = len(beta)
     # A component that contains beta and -beta surrounds zero, where two of the roots always lie.
     central = [i for i in range(count) if linked[i, i + count] or linked[i, 0]]
-    groups, seen = [_Group(central, False)], set(central)
+    groups = [_Group(central, False)]
+    seen = set(central)
     for i in range(count):
         if i not in seen:
             group = [j for j in range(count) if linked[i, j] or linked[i, j + count]]
@@ -311,7 +299,8 @@ def _newton_step(
     if degree == 0:
         return []
     factor = [c / size**n for n, c in enumerate(factors[which])]
-    cofactor, far = [1.0 + 0j], 1.0
+    cofactor = [1.0 + 0j]
+    far = 1.0
     for i, other in enumerate(factors):
         if i != which:
             scaled = [c / size**n for n, c in enumerate(other)]

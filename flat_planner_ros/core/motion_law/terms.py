@@ -28,11 +28,10 @@ from itertools import pairwise, zip_longest
 from math import comb
 from typing import NamedTuple, TypeVar
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
 import numpy as np
 from numpy.typing import NDArray
 
-ComplexArray = NDArray[np.complex128]
 Number = TypeVar('Number', np.float64, np.complex128)
 
 TOP_ORDER = 12
@@ -339,33 +338,22 @@ def _split(fall: ComplexArray, parts: FloatArray) -> None:
     np.negative(fall.imag, out=parts[..., 1, :])
 
 
-class GridBlocks(NamedTuple):
-    """
-    The first half of an even grid in blocks.
-
-    Attributes
-    ----------
-    size
-        Times in a block.
-    places
-        Distances from its first time within a block, distances of the blocks' first times from
-        the start, distances of their last ones from the end, shape (size + 2 blocks,).
-    x
-        Normalised times, exactly odd about the middle, shape (half,).
-
-    """
-
-    size: int
-    places: FloatArray
-    x: FloatArray
-
-
 @lru_cache(maxsize=BLOCKS_KEPT)
-def grid_blocks(intervals: int) -> GridBlocks:
-    """Return the blocks of a grid's first half, the middle included."""
+def grid_blocks(intervals: int) -> tuple[int, FloatArray, FloatArray]:
+    """
+    Return the first half of an even grid, the middle included, in blocks.
+
+    Returns
+    -------
+    tuple[int, FloatArray, FloatArray]
+        Times in a block; distances of the first block's times from the start, then of the blocks'
+        first times from the start, then of their last ones from the end, shape
+        (size + 2 blocks,); normalised times, exactly odd about the middle, shape (half,).
+
+    """
     half = intervals // 2 + 1
     size = min(BLOCK, half)
     first = np.arange(0, half, size)
     index = np.concatenate([np.arange(size), first, intervals - size + 1 - first])
     x = np.arange(-float(intervals), 2.0 * half - intervals, 2.0) / intervals
-    return GridBlocks(size, index * (2.0 / intervals), x)
+    return (size, index * (2.0 / intervals), x)

@@ -20,7 +20,7 @@ from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strat
 from flat_planner_ros.core.motion_law.extremal import (
     BoundaryConditions,
     costate,
-    extremal,
+    extremals,
     stationarity_residual,
 )
 import numpy as np
@@ -97,6 +97,11 @@ def random_jets(rng, rate):
     """Return jets at both ends whose derivatives grow like powers of a rate."""
     size = rate ** np.arange(6.0)
     return BoundaryConditions(start=size * rng.normal(size=6), end=size * rng.normal(size=6))
+
+
+def extremal(coefficients, duration, conditions):
+    """Return the law of one pair of ends."""
+    return extremals(coefficients, duration, [conditions])[0]
 
 
 def rest_to_rest(start, end):

@@ -20,7 +20,7 @@ from flat_planner_ros.core.arm.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.motion_law.basis import segment_basis
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
-from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremal
+from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremals
 from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 import numpy as np
 from path_programme import programmed_path
@@ -236,7 +236,7 @@ def test_a_path_continues_itself(costs, name):
 @pytest.mark.parametrize('name', STRATEGIES)
 def test_a_point_on_the_way_changes_nothing(costs, name):
     ends = BoundaryConditions(start=AT_REST, end=np.array([1.0, 0, 0, 0, 0, 0]))
-    direct = extremal(costs[name].characteristic(), 1.0, ends)
+    [direct] = extremals(costs[name].characteristic(), 1.0, [ends])
     edges = np.array([0.0, 0.3, 0.55, 1.0])
     jet = direct.jet(edges[1:], 1)
     found = certified(

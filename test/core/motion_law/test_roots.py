@@ -14,7 +14,7 @@
 
 """Characteristic roots: prescribed ones come back, as clusters that rebuild the polynomial."""
 
-from flat_planner_ros.core.motion_law.roots import clusters
+from flat_planner_ros.core.motion_law.roots import Spectrum
 import numpy as np
 import pytest
 
@@ -147,7 +147,7 @@ def check(oracle, found, coefficients, squares, tolerance=BACKWARD):
 def test_prescribed_roots_rebuild_the_polynomial(oracle, name):
     squares = [complex(z) for z in EXACT[name]]
     coefficients = coefficients_of(oracle, squares)
-    check(oracle, clusters(coefficients), coefficients, squares)
+    check(oracle, Spectrum(coefficients).clusters(), coefficients, squares)
 
 
 @pytest.mark.parametrize('exponent', range(3, 10))
@@ -155,7 +155,7 @@ def test_near_roots_share_a_well_conditioned_factor(oracle, exponent):
     """Roots 1e-3 to 1e-9 apart are off by as much, but not their factor."""
     squares = clustered(10.0**-exponent)
     coefficients = coefficients_of(oracle, squares)
-    found = clusters(coefficients)
+    found = Spectrum(coefficients).clusters()
     check(oracle, found, coefficients, squares)
     assert sorted(len(c.factor) - 1 for c in found) == [2, 2, 3]
     assert sorted((c.centre.real > 0.0, c.centre.imag > 0.0) for c in found) == [
@@ -171,7 +171,7 @@ def test_a_near_complex_pair_shares_a_factor(oracle, exponent):
     first, second = 300.0 + 400.0j, (300.0 + 400.0j) * (1.0 + gap)
     squares = [0.0, 0.0, first, first.conjugate(), second, second.conjugate()]
     coefficients = coefficients_of(oracle, squares)
-    found = clusters(coefficients)
+    found = Spectrum(coefficients).clusters()
     check(oracle, found, coefficients, squares)
     assert [len(c.factor) - 1 for c in found] == [4, 2]
 
@@ -196,7 +196,7 @@ def test_random_roots_rebuild_the_polynomial(oracle):
                 elif room >= 1:
                     squares.append(complex(near * (1.0 if kind == 2 else rng.choice([-1.0, 1.0]))))
         coefficients = coefficients_of(oracle, squares)
-        check(oracle, clusters(coefficients), coefficients, squares)
+        check(oracle, Spectrum(coefficients).clusters(), coefficients, squares)
         checked += 1
     assert checked == 150
 
@@ -209,7 +209,7 @@ def test_separate_roots_are_accurate_on_their_own_scale(oracle):
         exponents = np.sort(rng.choice(np.arange(1, 10), 5, replace=False))
         squares = 16.0 * 10.0 ** (2.0 * exponents)
         coefficients = coefficients_of(oracle, [0.0, *squares])
-        found = clusters(coefficients)
+        found = Spectrum(coefficients).clusters()
         centres = sorted(c.centre.real + np.roots(c.factor).real.sum() for c in found[1:])
         np.testing.assert_allclose(centres, np.sqrt(squares), rtol=1e-14)
         checked += len(centres)
@@ -219,6 +219,6 @@ def test_separate_roots_are_accurate_on_their_own_scale(oracle):
 def test_far_roots_are_not_linked(oracle):
     """A cluster is small: its power series would not converge otherwise."""
     for squares in EXACT.values():
-        for cluster in clusters(coefficients_of(oracle, squares)):
+        for cluster in Spectrum(coefficients_of(oracle, squares)).clusters():
             distances = np.abs(np.roots(cluster.factor))
             assert (distances <= 15.0 + 0.7 * cluster.centre.real).all()

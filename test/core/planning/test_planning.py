@@ -22,7 +22,7 @@ from flat_planner_ros.core.arm.errors import InvalidCost, InvalidRequest, NotFla
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
-from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremal
+from flat_planner_ros.core.motion_law.extremal import BoundaryConditions
 from flat_planner_ros.core.planning import certified_plan
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.reference_trajectory import problem_of
@@ -267,9 +267,8 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
         if damage == 'middle':
             return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1])
         end = 0.5 * np.eye(6)[0]
-        return extremal(
-            coefficients, 2.0, BoundaryConditions(start=-end, end=end * (1.0 + 1e-8))
-        ).terms
+        ends = BoundaryConditions(start=-end, end=end * (1.0 + 1e-8))
+        return extremals.extremals(coefficients, 2.0, [ends])[0].terms
 
     monkeypatch.setattr(extremals, 'unit_terms', wrong)
     extremals.kept_units.cache_clear()
