@@ -359,7 +359,8 @@ def _certified(coefficients: FloatArray) -> UnitMotion:
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     # Relative to the start, as the value's own peak is the distance.
     sizes = peaks[:CONDITIONS] + _UNIT_ENDS[:, 1]
-    miss = np.abs(jet[:CONDITIONS, [0, -1]] - _UNIT_ENDS) / sizes[:, None]
+    last = jet.shape[1] - 1
+    miss = np.abs(jet[:CONDITIONS, ::last] - _UNIT_ENDS) / sizes[:, None]  # first and last
     return UnitMotion(
         coefficients=coefficients,
         law=law,

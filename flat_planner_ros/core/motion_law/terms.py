@@ -204,13 +204,11 @@ class TermSum:
     ) -> None:
         """Add the terms that have both an exponential and powers."""
         after_start, before_end = distances
-        from_origin = {
-            -1: after_start,
-            0: 0.5 * (after_start - before_end),
-            1: -before_end,
-        }
         for term, table in self.others:
-            u = from_origin[term.origin]
+            if term.origin == 0:
+                u = 0.5 * (after_start - before_end)
+            else:
+                u = -before_end if term.origin > 0 else after_start
             powers = np.empty((len(table), len(u)))
             _fill_powers(powers, u)
             values = (table[:, : len(result)].T @ powers) * np.exp(term.rate * u)
