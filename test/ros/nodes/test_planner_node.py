@@ -15,6 +15,8 @@
 """The planner node on a real graph: one verdict per goal, commands as executors want them."""
 
 from math import inf, nan, pi
+from pathlib import Path
+import resource
 import signal
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -22,7 +24,7 @@ from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
-from ros.world import table
+from ros.world import ask, STATUS, table
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -432,10 +434,21 @@ def test_namespaces_and_remappings_hold(graph):
     assert planner.send(goal())['state'] == 'ACCEPTED'
 
 
-def test_an_internal_error_is_a_verdict_too(planner):
-    planner.node._session.submit = None  # Anything that is not foreseen.
-    verdict = planner.send(goal())
+def test_an_internal_error_is_a_verdict_too(graph):
+    parameters = ['start.source:=parameter', 'start.position:=[0.0, 0.0]']
+    words = [word for parameter in parameters for word in ('-p', parameter)]
+    process = graph.start('planner_node', '--ros-args', *words)
+    status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
+    assert ask(graph, status, goal(duration=0.3))['state'] == 'ACCEPTED'
+    graph.expect(lambda: values(status[-1].status[0])['state'] == 'FINISHED', 'the end')
+    # As much memory as it has, and no more: nothing that the planner foresees.
+    _, most = resource.prlimit(process.pid, resource.RLIMIT_AS)
+    pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[0])
+    resource.prlimit(process.pid, resource.RLIMIT_AS, (pages * resource.getpagesize(), most))
+    verdict = ask(graph, status, goal(duration=500.0))
     assert (verdict['error_code'], verdict['error_name']) == ('-199', 'INTERNAL')
+    resource.prlimit(process.pid, resource.RLIMIT_AS, (most, most))
+    assert ask(graph, status, goal(duration=500.0))['state'] == 'ACCEPTED'
 
 
 BAD_ARGUMENTS = {
