@@ -487,10 +487,14 @@ def test_a_monitor_that_has_been_stopped_does_not_call_it_silence(graph):
         for time in np.arange(round(since * RATE), round(until * RATE) + 1) / RATE:
             graph.expect(lambda t=float(time): is_heard(t), f'the sample of {time} s')
 
+    def pass_by(seconds):
+        begin = monotonic()
+        graph.expect(lambda: monotonic() - begin > seconds, f'{seconds} s')
+
     feed(START, START + 0.2)
+    pass_by(0.4)  # shorter than the timeout, and some ticks of the monitor's timer
     os.kill(bench.process.pid, signal.SIGSTOP)
-    stopped = monotonic()
-    graph.expect(lambda: monotonic() - stopped > 1.5, 'longer than the timeout')
+    pass_by(1.5)  # longer than the timeout
     os.kill(bench.process.pid, signal.SIGCONT)  # its timer may come before a sample
     feed(START + 0.22, START + DURATION + WINDOW)
     assert bench.report()[0] == DiagnosticStatus.WARN

@@ -20,7 +20,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
-from time import monotonic, sleep
+from time import monotonic
 
 from flat_planner_ros.figures.paper_example import SCENARIOS
 import pytest
@@ -93,7 +93,8 @@ class Launched:
             while not all((self.records / name).exists() for name in names):
                 assert process.poll() is None, self.output
                 assert monotonic() < end, self.output
-                sleep(0.05)
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(0.05)
         finally:
             process.send_signal(signal.SIGINT)
             with suppress(subprocess.TimeoutExpired):
