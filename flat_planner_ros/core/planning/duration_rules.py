@@ -123,7 +123,7 @@ class DurationRules:
             return self._shortest(plan_of, self.shortest), None
         prescribed = plan_of(duration)
         use = self.limits.worst(prescribed)
-        if use is None or not use.exceeded:
+        if use is None or not use.is_exceeded:
             return prescribed, None
         scales = self.on_violation is OnViolation.SCALE
         # To stretch is to take longer, even if something shorter obeys as well.

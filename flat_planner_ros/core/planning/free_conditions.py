@@ -72,51 +72,6 @@ PROBE = 1.0
 """Distance between the two final values that are tried [rad]."""
 
 
-def allocate_times(cost: QuadraticCost, path: PathConditions) -> FloatArray:
-    """
-    Return times of the via points that make a path cheap.
-
-    Parameters
-    ----------
-    cost
-        What is minimised, over the laws and the times.
-    path
-        What to go through, and in which duration; its other times do not matter.
-
-    Returns
-    -------
-    FloatArray
-        Edges for the path: 0, the times and the duration, shape (p + 1,) [s]. A local minimum:
-        no small change of the times is cheaper.
-
-    Raises
-    ------
-    UncertifiedPlan
-        The conditions of a path tried are singular in double precision.
-    ArithmeticError
-        Its numbers leave double precision.
-
-    """
-    from scipy.optimize import minimize  # here: slow to import, and only for goals without times
-
-    duration, count = float(path.edges[-1]), path.values.shape[1]
-    if count == 1:
-        return path.edges
-    lengths = np.linalg.norm(np.diff(path.values, prepend=path.start[:, :1], axis=1), axis=0)
-    if not lengths.any():
-        return np.linspace(0.0, duration, count + 1)
-    # Between constant speed and equal times: the ends are at rest, the rest is passed at speed.
-    guess = np.log(np.maximum(np.sqrt(lengths / lengths.max()), LEAST_SHARE))
-    found = minimize(
-        partial(_log_cost, cost, path),
-        guess - guess.mean(),
-        jac=True,
-        method='BFGS',
-        options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
-    )
-    return _edges(found.x, duration)
-
-
 def with_via_times(
     request: MotionRequest, arm: PlanarArm, options: PlanningOptions
 ) -> MotionRequest:
@@ -139,7 +94,7 @@ def with_via_times(
     """
     try:
         problem = problem_of(arm, options, request.duration)
-        edges = allocate_times(problem.cost, path_of(request, problem))
+        edges = _cheapest_edges(problem.cost, path_of(request, problem))
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, 0.0) from error
     via = tuple(
@@ -147,6 +102,28 @@ def with_via_times(
         for point, time in zip(request.via, edges[1:-1].tolist(), strict=True)
     )
     return replace(request, via=via)
+
+
+def _cheapest_edges(cost: QuadraticCost, path: PathConditions) -> FloatArray:
+    """Return edges of a path's segments that make it cheap: no small change of them is cheaper."""
+    from scipy.optimize import minimize  # here: slow to import, and only for goals without times
+
+    duration, count = float(path.edges[-1]), path.values.shape[1]
+    if count == 1:
+        return path.edges
+    lengths = np.linalg.norm(np.diff(path.values, prepend=path.start[:, :1], axis=1), axis=0)
+    if not lengths.any():
+        return np.linspace(0.0, duration, count + 1)
+    # Between constant speed and equal times: the ends are at rest, the rest is passed at speed.
+    guess = np.log(np.maximum(np.sqrt(lengths / lengths.max()), LEAST_SHARE))
+    found = minimize(
+        partial(_log_cost, cost, path),
+        guess - guess.mean(),
+        jac=True,
+        method='BFGS',
+        options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
+    )
+    return _edges(found.x, duration)
 
 
 def _shares(logarithms: FloatArray) -> FloatArray:
@@ -212,18 +189,17 @@ def stop_plan(
         Of the joints, if there are any.
 
     """
-    arm, options = running.problem.arm, running.options
     if jets is None:
         request = MotionRequest(start=pose, final=pose, duration=min(remaining, REST_DURATION))
-        return plan(request, arm, options)
+        return plan(request, running.problem.arm, running.options)
     effort = DEMAND * running.peak_effort
     velocity = DEMAND * running.peak_velocity
-    best = _stop(running, options, pose, jets, remaining)
+    best = _stop(running, pose, jets, remaining)
     shortest, longest = SHORTEST * remaining, remaining
     for _ in range(HALVINGS):
         middle = (shortest * longest) ** 0.5
         try:
-            tried = _stop(running, options, pose, jets, middle)
+            tried = _stop(running, pose, jets, middle)
         except UncertifiedPlan:
             shortest = middle
             continue
@@ -238,30 +214,20 @@ def stop_plan(
 def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
     """Tell whether a stop goes beyond a limit."""
     use = None if limits is None else limits.worst(tried)
-    return use is not None and use.exceeded
+    return use is not None and use.is_exceeded
 
 
-def _stop(
-    running: Plan,
-    options: PlanningOptions,
-    pose: FloatArray,
-    jets: FloatArray,
-    duration: float,
-) -> Plan:
+def _stop(running: Plan, pose: FloatArray, jets: FloatArray, duration: float) -> Plan:
     """Return the plan to rest of a given duration that costs least."""
-    arm = running.problem.arm
-    first, second = (
-        plan(
-            MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets),
-            arm,
-            options,
-        )
-        for values in (jets[:, 0], jets[:, 0] + PROBE)
-    )
-    low, high = _end_costates(first), _end_costates(second)
-    values = jets[:, 0] + PROBE * low / (low - high)
-    request = MotionRequest(start=pose, final=_pose(values), duration=duration, start_jets=jets)
-    return plan(request, arm, options)
+
+    def plan_to(values: FloatArray) -> Plan:
+        final = _pose(values)
+        request = MotionRequest(start=pose, final=final, duration=duration, start_jets=jets)
+        return plan(request, running.problem.arm, running.options)
+
+    here = jets[:, 0]
+    low, high = _end_costates(plan_to(here)), _end_costates(plan_to(here + PROBE))
+    return plan_to(here + PROBE * low / (low - high))
 
 
 def _end_costates(planned: Plan) -> FloatArray:

@@ -59,7 +59,7 @@ class LimitUse:
     ratio: float
 
     @property
-    def exceeded(self) -> bool:
+    def is_exceeded(self) -> bool:
         """Tell whether the motion goes beyond the limit."""
         return self.ratio > 1.0
 
@@ -104,19 +104,17 @@ class JointLimits:
         sizes = {name: len(getattr(self, name)) for name in FIELDS}
         if len(set(sizes.values())) != 1:
             raise InvalidRequest(f'limits must be of the same joints, got {sizes}')
-        ranges = zip(self.position_min, self.position_max, strict=True)
-        for joint, (low, high) in enumerate(ranges):
+        limits = zip(*(getattr(self, name) for name in FIELDS), strict=True)
+        for joint, (low, high, speed, effort) in enumerate(limits):
             if not (low <= high and low < inf and high > -inf):
                 raise InvalidRequest(
                     f'joint {joint + 1} has no position within its limits: limits.position_min = '
                     f'{low:g} rad, limits.position_max = {high:g} rad'
                 )
-        for joint, speed in enumerate(self.velocity):
             if not speed > 0.0:
                 raise InvalidRequest(
                     f'limits.velocity of joint {joint + 1} must be above 0, got {speed:g} rad/s'
                 )
-        for joint, effort in enumerate(self.effort):
             if not effort >= 0.0:
                 raise InvalidRequest(
                     f'limits.effort of joint {joint + 1} must not be negative, got {effort:g} N m'
@@ -203,18 +201,12 @@ class JointLimits:
 
     def at_ends(self, plan: Plan) -> LimitUse | None:
         """Return an effort beyond its limit at an end of a plan, which no duration changes."""
-        ends = np.array([0.0, plan.request.duration])
-        for time, efforts in zip(ends.tolist(), plan.at(ends).efforts, strict=True):
-            for joint, (effort, limit) in enumerate(zip(efforts, self.effort, strict=True)):
-                if abs(effort) > limit * (1.0 + ROUNDING):
-                    return LimitUse(
-                        joint=joint,
-                        quantity=Quantity.EFFORT,
-                        value=float(effort),
-                        limit=float(np.copysign(limit, effort)),
-                        time=time,
-                        ratio=inf,
-                    )
+        for time in (0.0, plan.duration):
+            efforts = plan.at(np.array([time])).efforts
+            found = Extrema.of_samples(np.array([time]), efforts)
+            for use in self._uses_of_magnitude(Quantity.EFFORT, found):
+                if use.is_exceeded:
+                    return use
         return None
 
     def uses(self, plan: Plan) -> list[LimitUse]:

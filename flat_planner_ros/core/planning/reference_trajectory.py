@@ -109,7 +109,9 @@ class MotionProblem:
 
     def grid(self, intervals: int) -> FloatArray:
         """Return derivatives 0 to 6 and driving effort at even times, read-only, shape (8, m)."""
-        return (_grid if intervals > MAX_KEPT_INTERVALS else _kept_grid)(self, intervals)
+        if intervals > MAX_KEPT_INTERVALS:
+            return _grid(self, intervals)
+        return _kept_grid(self, intervals)
 
     def fill_grid(self, table: FloatArray, distance: float) -> None:
         """Write derivatives 0 to 6 and driving effort over a distance at even times, (8, m)."""
@@ -180,7 +182,9 @@ _kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
 
 def even_times(duration: float, intervals: int) -> FloatArray:
     """Return even times of a motion, both ends exact, read-only, shape (m,) [s]."""
-    return (_times if intervals > MAX_KEPT_INTERVALS else _kept_times)(duration, intervals)
+    if intervals > MAX_KEPT_INTERVALS:
+        return _times(duration, intervals)
+    return _kept_times(duration, intervals)
 
 
 def _times(duration: float, intervals: int) -> FloatArray:

@@ -14,7 +14,7 @@
 
 """What is asked of the planner, a motion that ends at rest; what it minimises; its refusal."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, KW_ONLY, replace
 from enum import Enum
 from math import isfinite
 
@@ -191,6 +191,7 @@ class Reason(Enum):
     INTERNAL = 'INTERNAL'
 
 
+@dataclass(eq=False, repr=False)
 class RequestRejected(FlatPlannerError):
     """
     A request that is answered with a refusal.
@@ -199,6 +200,8 @@ class RequestRejected(FlatPlannerError):
     ----------
     reason
         The rule that it breaks.
+    message
+        The same as a sentence.
     joint
         The joint concerned, if one is.
     value, limit
@@ -210,25 +213,18 @@ class RequestRejected(FlatPlannerError):
 
     """
 
-    def __init__(
-        self,
-        reason: Reason,
-        message: str,
-        *,
-        joint: str | None = None,
-        value: float | None = None,
-        limit: float | None = None,
-        time: float | None = None,
-        duration_min: float | None = None,
-    ) -> None:
-        """Keep the numbers apart from the sentence."""
-        super().__init__(message)
-        self.reason = reason
-        self.joint = joint
-        self.value = value
-        self.limit = limit
-        self.time = time
-        self.duration_min = duration_min
+    reason: Reason
+    message: str
+    _: KW_ONLY
+    joint: str | None = None
+    value: float | None = None
+    limit: float | None = None
+    time: float | None = None
+    duration_min: float | None = None
+
+    def __post_init__(self) -> None:
+        """Say the sentence as every exception does."""
+        super().__init__(self.message)
 
 
 def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ until one that obeys is found next to one that does not, and then looks for othe
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, isfinite, log, sqrt
 
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, OutOfReach, UncertifiedPlan
@@ -56,6 +56,7 @@ POWERS = {Quantity.POSITION: 2.0, Quantity.VELOCITY: 1.0, Quantity.EFFORT: 2.0}
 """How the use of a limit falls with the duration of a fixed shape, to leading order."""
 
 
+@dataclass(eq=False, repr=False)
 class NoFeasibleDuration(FlatPlannerError):
     """
     No duration keeps a motion within the limits.
@@ -74,21 +75,17 @@ class NoFeasibleDuration(FlatPlannerError):
 
     """
 
-    def __init__(
-        self,
-        use: LimitUse,
-        duration: float,
-        shortest: float,
-        longest: float,
-        at_end: bool = False,
-    ) -> None:
-        """Keep the numbers, so that a caller can name the joint."""
-        super().__init__(f'no duration from {shortest:g} to {longest:g} s obeys the limits')
-        self.use = use
-        self.duration = duration
-        self.shortest = shortest
-        self.longest = longest
-        self.at_end = at_end
+    use: LimitUse
+    duration: float
+    shortest: float
+    longest: float
+    at_end: bool = False
+
+    def __post_init__(self) -> None:
+        """Say the range in a sentence."""
+        super().__init__(
+            f'no duration from {self.shortest:g} to {self.longest:g} s obeys the limits'
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -162,60 +159,55 @@ def shortest_plan(
     return _Search(plan_of, limits, shortest, longest).run()
 
 
+@dataclass(eq=False)
 class _Search:
     """Durations tried so far, and which to try next."""
 
-    def __init__(
-        self,
-        plan_of: Callable[[float], Plan],
-        limits: JointLimits,
-        shortest: float,
-        longest: float,
-    ) -> None:
-        """Start with nothing tried."""
-        self._plan_of, self._limits = plan_of, limits
-        self._shortest, self._longest = shortest, longest
-        self._trials: dict[float, _Trial] = {}
-        self._failure: FlatPlannerError | None = None
+    plan_of: Callable[[float], Plan]
+    limits: JointLimits
+    shortest: float
+    longest: float
+    trials: dict[float, _Trial] = field(default_factory=dict)
+    failure: FlatPlannerError | None = None
 
     def run(self) -> Plan:
         """Return the shortest plan found."""
         if not self._bracket():
-            self._scan(self._shortest, self._longest)
+            self._scan(self.shortest, self.longest)
             self._refuse_if_none()
         while True:
             self._refine()
             lowest = self._lowest
-            self._scan(max(self._shortest, lowest.duration / SCAN_DEPTH), lowest.duration)
+            self._scan(max(self.shortest, lowest.duration / SCAN_DEPTH), lowest.duration)
             if self._lowest is lowest and lowest.plan is not None:
                 return lowest.plan
 
     @property
     def _lowest(self) -> _Trial:
         """Return the shortest trial that obeys."""
-        return min((t for t in self._trials.values() if t.obeys), key=lambda t: t.duration)
+        return min((t for t in self.trials.values() if t.obeys), key=lambda t: t.duration)
 
     def _try(self, duration: float, *, briefly: bool = False) -> _Trial:
         """Return the trial of a duration, rounded so that its usual text is exactly it."""
         rounded = float(f'{duration:.{DIGITS}g}')
-        duration = min(max(rounded, self._shortest), self._longest)
-        known = self._trials.get(duration)
+        duration = min(max(rounded, self.shortest), self.longest)
+        known = self.trials.get(duration)
         if known is not None and (briefly or not known.is_sampled):
             return known
         try:
-            plan = self._plan_of(duration)
+            plan = self.plan_of(duration)
         except (UncertifiedPlan, OutOfReach) as error:
-            self._failure = error
+            self.failure = error
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
             self._refuse_ends(plan)
             uses = []
             if briefly:
                 times = plan.duration * np.linspace(0.0, 1.0, SAMPLES)
-                uses = self._limits.uses_at(plan, times)
-            is_sampled = any(use.exceeded for use in uses)
+                uses = self.limits.uses_at(plan, times)
+            is_sampled = any(use.is_exceeded for use in uses)
             if not is_sampled:
-                uses = self._limits.uses(plan)
+                uses = self.limits.uses(plan)
             worst = max(uses, key=lambda use: use.ratio, default=None)
             stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
             trial = _Trial(
@@ -226,20 +218,20 @@ class _Search:
                 estimate=duration * max(stretch, default=0.0),
                 is_sampled=is_sampled,
             )
-        self._trials[duration] = trial
+        self.trials[duration] = trial
         return trial
 
     def _bracket(self) -> bool:
         """Look for one duration that obeys above one that does not; tell if any obeys."""
         stride = FIRST_STRIDE
-        trial = self._try(sqrt(self._shortest * self._longest))
+        trial = self._try(sqrt(self.shortest * self.longest))
         descends = trial.obeys
         while trial.obeys == descends:
             here = trial.duration
             if descends:
-                beyond = max(self._shortest, min(trial.estimate / AIM, here / FIRST_STRIDE))
+                beyond = max(self.shortest, min(trial.estimate / AIM, here / FIRST_STRIDE))
             else:
-                beyond = min(self._longest, max(trial.estimate * AIM, here * stride))
+                beyond = min(self.longest, max(trial.estimate * AIM, here * stride))
                 stride *= stride
             if beyond == here:
                 break
@@ -251,11 +243,11 @@ class _Search:
         stuck = False
         while True:
             good = self._lowest
-            below = [t for t in self._trials.values() if t.duration < good.duration]
+            below = [t for t in self.trials.values() if t.duration < good.duration]
             if not below:
-                if good.duration == self._shortest:
+                if good.duration == self.shortest:
                     return
-                self._try(max(self._shortest, good.duration / SCAN_STEP))
+                self._try(max(self.shortest, good.duration / SCAN_STEP))
                 continue
             bad = max(below, key=lambda t: t.duration)
             width = good.duration / bad.duration
@@ -284,19 +276,19 @@ class _Search:
 
     def _refuse_ends(self, plan: Plan) -> None:
         """Refuse a motion that starts or ends with too large an effort; looked at once."""
-        if self._trials or Quantity.EFFORT not in self._limits.quantities:
+        if self.trials or Quantity.EFFORT not in self.limits.quantities:
             return
-        use = self._limits.at_ends(plan)
+        use = self.limits.at_ends(plan)
         if use is not None:
-            raise NoFeasibleDuration(use, plan.duration, self._shortest, self._longest, True)
+            raise NoFeasibleDuration(use, plan.duration, self.shortest, self.longest, True)
 
     def _refuse_if_none(self) -> None:
         """Refuse if no trial obeys."""
-        while (least := min(self._trials.values(), key=lambda trial: trial.ratio)).is_sampled:
+        while (least := min(self.trials.values(), key=lambda trial: trial.ratio)).is_sampled:
             self._try(least.duration)
         if least.obeys:
             return
         if least.worst is not None:
-            raise NoFeasibleDuration(least.worst, least.duration, self._shortest, self._longest)
-        if self._failure is not None:
-            raise self._failure
+            raise NoFeasibleDuration(least.worst, least.duration, self.shortest, self.longest)
+        if self.failure is not None:
+            raise self.failure

@@ -253,8 +253,8 @@ def test_a_stop_obeys_the_limits(paper_arm):
     free, limited = (session(paper_arm, limits=each) for each in (None, limits))
     first, _ = (each.submit(goal(time=1.0), 10.0) for each in (free, limited))
     unlimited, stop = free.stop(10.25), limited.stop(10.25)
-    assert limits.worst(unlimited.plan).exceeded  # else the case shows nothing
-    assert not limits.worst(stop.plan).exceeded
+    assert limits.worst(unlimited.plan).is_exceeded  # else the case shows nothing
+    assert not limits.worst(stop.plan).is_exceeded
     assert unlimited.end < stop.end <= first.end
 
 
@@ -264,7 +264,7 @@ def test_a_motion_at_its_limits_can_be_stopped_within_them(paper_arm, elapsed):
     moving = session(paper_arm, limits=limits)
     motion = moving.submit(goal(time=1.0), 10.0)
     stop = moving.stop(10.0 + elapsed)
-    assert not limits.worst(stop.plan).exceeded
+    assert not limits.worst(stop.plan).is_exceeded
     assert stop.end <= motion.end
 
 

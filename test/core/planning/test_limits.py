@@ -242,7 +242,7 @@ def test_a_limit_between_two_samples_counts(paper_arm):
     limit = 0.5 * (sampled + peak)
     assert sampled < limit < peak
     violation = JointLimits.of(2, effort=[limit, inf]).worst(planned)
-    assert violation.exceeded
+    assert violation.is_exceeded
     assert (violation.joint, violation.quantity) == (0, Quantity.EFFORT)
     assert abs(violation.value) == pytest.approx(peak)
     assert violation.limit == pytest.approx(np.copysign(limit, violation.value))
@@ -260,7 +260,7 @@ def test_what_is_just_within_its_limits_obeys_and_what_is_just_beyond_does_not(p
         'velocity': found[Quantity.VELOCITY].peak,
         'effort': found[Quantity.EFFORT].peak,
     }
-    assert not JointLimits(**exact).worst(planned).exceeded
+    assert not JointLimits(**exact).worst(planned).is_exceeded
     deflection = position.highest[1]
     for name, joint, step in (
         ('position_min', 1, 1e-6 * deflection),
@@ -274,7 +274,7 @@ def test_what_is_just_within_its_limits_obeys_and_what_is_just_beyond_does_not(p
         limits = JointLimits(**{**exact, name: values})
         assert limits.worst(planned).joint == joint
         assert limits.worst(planned).quantity.value in name
-        assert limits.worst(planned).exceeded
+        assert limits.worst(planned).is_exceeded
 
 
 def test_without_limits_everything_obeys(paper_arm):

@@ -177,7 +177,7 @@ def test_the_answer_obeys_and_nothing_shorter_does(seed):
     grid = found.duration * np.geomspace(0.5, 0.999, 60)
     assert min(uses_of(motion(duration), limits) for duration in grid[::6]) > 1.0
     worst = [limits.worst(motion(duration)) for duration in grid]
-    assert all(use.exceeded for use in worst)
+    assert all(use.is_exceeded for use in worst)
 
 
 def test_velocity_alone_gives_the_time_of_the_polynomials_peak():
@@ -242,7 +242,7 @@ def test_a_faster_motion_may_take_less_effort_and_is_found():
     found = shortest_plan(motion, limits, **RANGE)
     assert found.duration < durations[best]
     assert uses_of(found, limits) <= 1.0 + 1e-9
-    assert limits.worst(motion(20.0)).exceeded
+    assert limits.worst(motion(20.0)).is_exceeded
 
 
 def test_a_load_on_the_way_that_no_duration_lifts_is_refused_with_its_number():
