@@ -25,7 +25,7 @@ the eleventh at both ends, since neighbours share the conditions there ((V4)).
 from cmath import exp
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
@@ -58,6 +58,8 @@ BASES_KEPT = 256
 SPECTRA_KEPT = 64
 """Sets of roots that are remembered, one for each combination of arm and cost."""
 
+_FACTORIALS = np.cumprod(np.maximum(np.arange(SERIES_LENGTH, dtype=float), 1.0))
+
 _END = np.array([1.0])
 
 _FAR_END = np.array([-2.0])
@@ -81,7 +83,7 @@ class Block(NamedTuple):
     columns
         Their derivatives 0 to 5 at x = 1, a list of six numbers each.
     rate, origin
-        As in their terms; those with an origin at the end have a mirror image.
+        What their terms have in common; with an origin at the end they have a mirror image.
     series
         Coefficients of ascending powers, one solution in each row, shape (functions, powers); None
         if they are the real and the imaginary part of one exponential.
@@ -128,13 +130,13 @@ def block_of(cluster: Cluster, parity: float) -> Block:
         # conj(f_j(-x)) = (-1)^j f_j(x): Re f_j has the parity of j, Im f_j the other one.
         is_odd = np.arange(len(table)) % 2
         table = np.where(is_odd == _lowest_power(parity), 1.0, -1j)[:, None] * table
-        series = table / _factorials(SERIES_LENGTH)
+        series = table / _FACTORIALS
         origin = 0
         [ends] = _derivatives(centre, series, _END, CONDITIONS - 1)
     else:
         if centre.imag != 0.0:
             table = np.concatenate([table, -1j * table])
-        series = table / _factorials(SERIES_LENGTH)
+        series = table / _FACTORIALS
         origin = 1
         ends = table[:, :CONDITIONS] @ leibniz(centre, CONDITIONS - 1).T
         if centre.real < FAR:
@@ -153,7 +155,7 @@ def _central(factor: bytes, parity: float) -> Block:
     half = unit_solutions(even[::2], SERIES_LENGTH // 2)
     terms[:, _lowest_power(parity) :: 2] = half
     last = np.flatnonzero(terms.any(axis=0))[-1]
-    series = terms[:, : last + 1] / _factorials(SERIES_LENGTH)[: last + 1]
+    series = terms[:, : last + 1] / _FACTORIALS[: last + 1]
     columns = series_derivatives(series, CONDITIONS - 1).sum(axis=1).tolist()
     return Block(max(1.0, _spread(even)), columns, 0j, 0, series)
 
@@ -229,12 +231,6 @@ def unit_solutions(factor: NDArray[Number], terms: int) -> NDArray[Number]:
     return table
 
 
-@cache
-def _factorials(count: int) -> FloatArray:
-    """Return 0! ... (count - 1)!."""
-    return np.cumprod(np.maximum(np.arange(count, dtype=float), 1.0))
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SegmentBasis:
     """
@@ -277,8 +273,8 @@ def segment_basis(key: bytes, reference: bytes) -> SegmentBasis:
     key
         The bytes of the coefficients a_0 ... a_6 in normalised time.
     reference
-        The same in another unit of time, common to all segments of a path: in it the roots are
-        found.
+        These coefficients in another unit of time, common to all segments of a path: in it the
+        roots are found.
 
     """
     scale = _scale(np.frombuffer(key), np.frombuffer(reference))

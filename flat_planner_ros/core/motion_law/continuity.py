@@ -44,7 +44,7 @@ class Amplitudes(NamedTuple):
     Attributes
     ----------
     values
-        Those of every segment, whose value at its start counts as 0, shape (p, 12, m).
+        Amplitudes on every segment, whose value at its start counts as 0, shape (p, 12, m).
     correction
         What the last correction still changed: largest derivatives 0 to 6 at the segments' ends,
         shape (7, m). Each correction is smaller than the one before by about the same factor, so

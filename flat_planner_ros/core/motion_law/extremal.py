@@ -150,9 +150,9 @@ def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
         magnitudes [-].
 
     """
-    weights, even = coefficients[1:], jet[2::2]
-    size = float((np.abs(weights) @ np.abs(even)).max())
-    return float(np.abs(weights @ even).max()) / size if size > 0.0 else 0.0
+    even = jet[2::2]
+    size = float((np.abs(coefficients[1:]) @ np.abs(even)).max())
+    return float(np.abs(coefficients[1:] @ even).max()) / size if size > 0.0 else 0.0
 
 
 def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
@@ -172,7 +172,7 @@ def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
     Returns
     -------
     FloatArray
-        Its value at each of the times, shape (m,) [rad s^-11].
+        Half the costate at each of the times, shape (m,) [rad s^-11].
 
     """
     value: FloatArray = -coefficients[1:] @ jet[1::2]
@@ -376,7 +376,7 @@ def probes() -> FloatArray:
     """
     Return x + 1 and 1 - x at times that crowd towards the start as fast as boundary layers can.
 
-    Those from 0 to 1, of which one half of a motion has enough, and last the end, 2.
+    They run from 0 to 1, as one half of a motion has enough; the last one is the end, 2.
     """
     layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
     times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))

@@ -241,7 +241,8 @@ def _boundary_residual(
     """Return the largest miss of a prescribed quantity or jump up to the fifth derivative."""
     values = path.values[variable]
     rest = np.append(values[-1], np.zeros(CONDITIONS - 1))
-    before, after = ends[:-1, 1], ends[1:, 0]
+    before = ends[:-1, 1]
+    after = ends[1:, 0]
     misses = [ends[0, 0, :CONDITIONS] - path.start[variable], ends[-1, 1, :CONDITIONS] - rest]
     misses += list((after - before)[:, :CONDITIONS])
     missed = np.abs(misses).max(axis=0)

@@ -43,7 +43,7 @@ PAIR_LINK = 0.1
 """Two roots alone may come as close as this and still be told apart at a loss of one digit [-]."""
 
 PAIR_RELATIVE_LINK = 0.02
-"""The same as a share of their modulus, which bounds the loss in the roots themselves [-]."""
+"""Such a distance as a share of their modulus, which bounds the loss in the roots [-]."""
 
 REFINEMENTS = 3
 """Most Newton steps on a factor; each about squares the error of the companion eigenvalues."""
@@ -109,7 +109,8 @@ class Spectrum:
                 central = Cluster(centre=0j, factor=_monomial(2 * self._zeros))
                 others = (Cluster(centre=beta, factor=_monomial(1)) for beta in roots)
                 return [central, *others]
-        linked = self._links(scale)
+        distances, bridged = self._distances
+        linked: BoolArray = distances <= np.maximum(LINK / scale, bridged)
         key = linked.tobytes()
         if key not in self._grouped:
             self._grouped[key] = self._of_groups(linked)
@@ -132,12 +133,6 @@ class Spectrum:
         is_same_side = np.outer(both.real, both.real) > 0.0
         bridged = np.where(is_same_side, RELATIVE_LINK * np.minimum.outer(decay, decay), 0.0)
         return np.abs(both[:, None] - both[None, :]), bridged
-
-    def _links(self, scale: float) -> BoolArray:
-        """Return which of the twelve +-beta are close together, shape (12, 12)."""
-        distances, bridged = self._distances
-        linked: BoolArray = distances <= np.maximum(LINK / scale, bridged)
-        return linked
 
     def _of_groups(self, linked: BoolArray) -> list[Cluster]:
         """Return the clusters of linked roots, in the spectrum's own unit."""
@@ -203,7 +198,8 @@ def _are_apart(roots: list[complex]) -> bool:
 def _polished(ascending: list[float], z: complex) -> complex | None:
     """Return a root after Newton steps, None if they do not converge."""
     for _ in range(MAX_STEPS):
-        value, slope = 0j, 0j
+        value = 0j
+        slope = 0j
         for a in reversed(ascending):
             slope = slope * z + value
             value = value * z + a

@@ -67,7 +67,7 @@ class Term(NamedTuple):
     origin
         -1, 0 or 1 [-].
     coefficients
-        Of ascending powers [rad].
+        Factors of ascending powers of x - origin [rad].
 
     """
 
@@ -126,7 +126,8 @@ class TermSum:
             Row k holds the k-th derivative, shape (order + 1, m).
 
         """
-        count, places = len(self.decays), distances.shape[1]
+        count = len(self.decays)
+        places = distances.shape[1]
         basis = np.empty((self.factors.shape[1], places))
         # Far from its end an exponential vanishes: this underflow is the right answer.
         with np.errstate(under='ignore'):
@@ -152,8 +153,10 @@ class TermSum:
             Factors of the derivatives, shape (orders,).
 
         """
-        orders, intervals = len(table), table.shape[1] - 1
-        count, half = len(self.decays), intervals // 2 + 1
+        orders = len(table)
+        intervals = table.shape[1] - 1
+        half = intervals // 2 + 1
+        count = len(self.decays)
         size, places, x = grid_blocks(intervals)
         factors = scales[:, None] * self.factors[:orders]
         amplitudes = factors[:, None, : 4 * count].view(complex)
