@@ -35,7 +35,7 @@ from flat_planner_ros.core.arm.errors import (
 )
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
-from flat_planner_ros.core.arm.planar_arm import NaturalMode, PlanarArm
+from flat_planner_ros.core.arm.planar_arm import Drive, NaturalMode, PlanarArm
 from flat_planner_ros.core.arm.samples import JointSample, SampledMotion
 from flat_planner_ros.core.arm.urdf import (
     ArmDescription,
@@ -55,6 +55,7 @@ __all__ = [
     'Counterbalances',
     'counterbalances',
     'displaced_com',
+    'Drive',
     'flat_map',
     'FlatMap',
     'FlatModel',

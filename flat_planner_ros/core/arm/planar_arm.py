@@ -20,6 +20,7 @@ balanced or not (docs/derivation.md).
 """
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 from math import sqrt
 from typing import NamedTuple, TypeVar
@@ -64,6 +65,16 @@ class InertiaStar(NamedTuple):
 
     both: float
     last: float
+
+
+class Drive(Enum):
+    """What moves joint n-1; the resonance of the passive joint depends on it."""
+
+    EFFORT = 'effort'
+    """An effort: the joint is free to give way, and free after a motion."""
+
+    POSITION = 'position'
+    """A servo that is stiff enough to follow planned angles whatever the passive joint does."""
 
 
 class NaturalMode(NamedTuple):

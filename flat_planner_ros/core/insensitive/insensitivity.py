@@ -17,11 +17,15 @@
 from dataclasses import dataclass, field
 from enum import Enum
 from math import isfinite
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import InvalidRequest
 
 MAX_HALF_WIDTH = 0.9
 """Widest uncertainty of a parameter, as a share of its nominal value [-]."""
+
+MAX_PAYLOAD = 100.0
+"""Largest payload, as a share of the last link's inertia [-]."""
 
 DEFAULT_WEIGHT = 700.0
 """Weight where nothing is chosen: a residual of 1/700 of the way costs as much as all effort."""
@@ -33,29 +37,58 @@ MIN_MODES, MAX_MODES = 6, 48
 """Range of the number of free coefficients of the law."""
 
 
+class Range(NamedTuple):
+    """Smallest and largest factor on a nominal value [-]."""
+
+    low: float
+    high: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class UncertaintyBox:
     """
-    Range of the true stiffness and damping about the nominal ones.
+    Range of the true stiffness, damping and inertia of the last link about the nominal ones.
 
     Attributes
     ----------
-    stiffness, damping
+    stiffness, damping, inertia
         Half-widths as shares of the nominal values [-].
+    payload
+        What the last link may carry, from the least to the most, as shares of its nominal inertia
+        about joint n; it adds to the inertia's half-width [-].
 
     """
 
     stiffness: float = 0.1
     damping: float = 0.1
+    inertia: float = 0.0
+    payload: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse a box that reaches arms without a spring."""
-        for name in ('stiffness', 'damping'):
+        """Refuse a box that reaches arms without a spring or a last link."""
+        for name in ('stiffness', 'damping', 'inertia'):
             width = getattr(self, name)
             if not 0.0 <= width <= MAX_HALF_WIDTH:
                 raise InvalidRequest(
                     f'half-width of the {name} is {width:g}, outside [0, {MAX_HALF_WIDTH:g}]'
                 )
+        least, most = self.payload
+        if not (self.ranges[2].low >= 1.0 - MAX_HALF_WIDTH and least <= most <= MAX_PAYLOAD):
+            raise InvalidRequest(
+                f"payload from {least:g} to {most:g} of the last link's inertia, with a "
+                f'half-width of {self.inertia:g}: the first must not exceed the second, nor this '
+                f'{MAX_PAYLOAD:g}, and {1.0 - MAX_HALF_WIDTH:.2g} of the inertia must be left'
+            )
+
+    @property
+    def ranges(self) -> tuple[Range, Range, Range]:
+        """Factors on stiffness, damping and the last link's inertia."""
+        least, most = self.payload
+        return (
+            Range(1.0 - self.stiffness, 1.0 + self.stiffness),
+            Range(1.0 - self.damping, 1.0 + self.damping),
+            Range(1.0 + least - self.inertia, 1.0 + most + self.inertia),
+        )
 
 
 class Nominal(Enum):
@@ -89,7 +122,7 @@ class Insensitivity:
     Attributes
     ----------
     box
-        Uncertainty of stiffness and damping.
+        What is uncertain.
     nominal
         What may be left on the nominal arm.
     criterion

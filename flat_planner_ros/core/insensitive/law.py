@@ -15,19 +15,19 @@
 """
 The strategy `insensitive`: effort against the residual on arms other than the model.
 
-In the basis of `momentum_angle` effort is a plain sum of squares and every residual amplitude the
+In a basis of `momentum_angle` effort is a plain sum of squares and every residual amplitude the
 magnitude of one complex number, linear in the coefficients. A quadratic compromise is therefore
 a small linear system, and the largest residual over a box takes a few dozen points of its edges
 that are reweighted (docs/derivation.md, section I).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import log10, sqrt, tau
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import flat_map, FlatModel, FloatArray, OutOfReach, PlanarArm
+from flat_planner_ros.core.arm import Drive, FloatArray, OutOfReach, PlanarArm
 from flat_planner_ros.core.insensitive.insensitivity import (
     Criterion,
     DEFAULT_WEIGHT,
@@ -36,15 +36,16 @@ from flat_planner_ros.core.insensitive.insensitivity import (
     Nominal,
 )
 from flat_planner_ros.core.insensitive.momentum_angle import (
+    basis_for,
     largest_miss,
     least_effort,
     LEAST_OF_ALL,
-    momentum_basis,
     MomentumBasis,
     response,
     SeriesLaw,
 )
-from flat_planner_ros.core.insensitive.residual import largest, legendre_residuals, Oscillator
+from flat_planner_ros.core.insensitive.oscillator import largest, Oscillator
+from flat_planner_ros.core.insensitive.residual import legendre_residuals
 import numpy as np
 
 GAP = 5e-3
@@ -104,7 +105,11 @@ class InsensitiveMotion:
 
 
 def insensitive_motion(
-    arm: PlanarArm, duration: float, wanted: Insensitivity, distance: float
+    arm: PlanarArm,
+    duration: float,
+    wanted: Insensitivity,
+    distance: float,
+    drive: Drive = Drive.EFFORT,
 ) -> InsensitiveMotion:
     """
     Return the insensitive motion over 1 rad, for use over a distance.
@@ -119,6 +124,8 @@ def insensitive_motion(
         Uncertainty and trade.
     distance
         Of the planned variable; only prescribed bounds depend on it [rad].
+    drive
+        What moves joint n-1.
 
     Raises
     ------
@@ -130,10 +137,12 @@ def insensitive_motion(
         The arm is not flat.
 
     """
-    return _solved(arm, duration, wanted, abs(distance) if wanted.is_bounded else 1.0)
+    return _solved(arm, duration, wanted, abs(distance) if wanted.is_bounded else 1.0, drive)
 
 
-def check_insensitivity(arm: PlanarArm, wanted: Insensitivity) -> None:
+def check_insensitivity(
+    arm: PlanarArm, wanted: Insensitivity, drive: Drive = Drive.EFFORT
+) -> None:
     """
     Solve a problem of this kind, so that it is known to have a solution.
 
@@ -145,16 +154,16 @@ def check_insensitivity(arm: PlanarArm, wanted: Insensitivity) -> None:
         The arm is not flat.
 
     """
-    period = tau / Oscillator.of(arm).frequency
-    _Problem.of(arm, period, wanted).solve(DEFAULT_WEIGHT)
+    oscillator = Oscillator.of(arm, drive)
+    _Problem.of(oscillator, tau / oscillator.frequency, wanted).solve(DEFAULT_WEIGHT)
 
 
 @lru_cache(maxsize=MOTIONS_KEPT)
 def _solved(
-    arm: PlanarArm, duration: float, wanted: Insensitivity, distance: float
+    arm: PlanarArm, duration: float, wanted: Insensitivity, distance: float, drive: Drive
 ) -> InsensitiveMotion:
     """Return the motion; arms count as equal if identical."""
-    problem = _Problem.of(arm, duration, wanted)
+    problem = _Problem.of(Oscillator.of(arm, drive), duration, wanted)
     least = least_effort(arm, distance, duration)
     if wanted.max_residual > 0.0:
         found = _within_residual(problem, distance, least)
@@ -162,7 +171,7 @@ def _solved(
         found = _within_effort(problem, distance, least)
     else:
         found = problem.solve(wanted.weight or DEFAULT_WEIGHT)
-    return _motion(arm, problem, found)
+    return _motion(problem, found)
 
 
 def _within_residual(problem: '_Problem', distance: float, least: float) -> '_Compromise':
@@ -230,18 +239,20 @@ class _Problem:
     basis: MomentumBasis
 
     @classmethod
-    def of(cls, arm: PlanarArm, duration: float, wanted: Insensitivity) -> '_Problem':
+    def of(cls, oscillator: Oscillator, duration: float, wanted: Insensitivity) -> '_Problem':
         """Return the problem, what is left on the nominal arm settled."""
-        basis, oscillator = momentum_basis(wanted.modes), Oscillator.of(arm)
-        if wanted.nominal is Nominal.EXACT:
-            matrix, start = _residuals(oscillator, np.ones((1, 2)), duration, basis)
-            left, sizes, right = np.linalg.svd(matrix)
-            basis = basis.changed(right[:2].T @ (-(left.T @ start) / sizes), right[2:].T)
-        return cls(oscillator=oscillator, duration=duration, wanted=wanted, basis=basis)
+        basis = basis_for(oscillator, duration, wanted.modes)
+        problem = cls(oscillator=oscillator, duration=duration, wanted=wanted, basis=basis)
+        if wanted.nominal is Nominal.FREE:
+            return problem
+        matrix, start = problem.residuals(np.ones((1, 3)))
+        left, sizes, right = np.linalg.svd(matrix)
+        origin = right[:2].T @ (-(left.T @ start) / sizes)
+        return replace(problem, basis=basis.changed(origin, right[2:].T))
 
     @cached_property
     def points(self) -> tuple[FloatArray, FloatArray]:
-        """Return the arms that are weighed, (p, 2), and shares of weight to begin with, (p,)."""
+        """Return the arms that are weighed, (p, 3), and shares of weight to begin with, (p,)."""
         if not self.is_minimax:
             return self.oscillator.nodes(self.wanted.box, self.duration)
         edges = self.oscillator.edges(self.wanted.box, self.duration, MAX_POINTS)
@@ -262,16 +273,32 @@ class _Problem:
     def _edges(self) -> tuple[list[FloatArray], tuple[FloatArray, FloatArray]]:
         """Return the edges of the box and the residuals on them."""
         edges = self.oscillator.edges(self.wanted.box, self.duration)
-        return edges, self._residuals(np.concatenate(edges))
+        return edges, self.residuals(np.concatenate(edges))
 
     @cached_property
     def _weighed(self) -> tuple[FloatArray, FloatArray]:
         """Return the residuals of the arms that are weighed."""
-        return self._residuals(self.points[0])
+        return self.residuals(self.points[0])
 
-    def _residuals(self, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the residuals of arms, in the form of the function `_residuals`."""
-        return _residuals(self.oscillator, factors, self.duration, self.basis)
+    def residuals(self, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """
+        Return residuals per rad as matrix @ c + start, real parts above imaginary ones.
+
+        Parameters
+        ----------
+        factors
+            Arms, as for `Oscillator.poles`, shape (p, 3) [-].
+
+        Returns
+        -------
+        tuple[FloatArray, FloatArray]
+            Shapes (2 p, modes) and (2 p,) [-].
+
+        """
+        basis = self.basis
+        rows = legendre_residuals(self.oscillator, factors, self.duration, len(basis.second_start))
+        stacked = np.concatenate([rows.real, rows.imag])
+        return stacked @ basis.second_directions, stacked @ basis.second_start
 
     def solve(self, weight: float, shares: FloatArray | None = None) -> _Compromise:
         """Return the best coefficients for a weight; the shares are a first guess."""
@@ -303,44 +330,20 @@ class _Problem:
         return self.wanted.criterion is Criterion.WORST
 
 
-def _motion(arm: PlanarArm, problem: _Problem, found: _Compromise) -> InsensitiveMotion:
+def _motion(problem: _Problem, found: _Compromise) -> InsensitiveMotion:
     """Return the law of a solution, with its certificate."""
     basis = problem.basis
     second = basis.second_start + basis.second_directions @ found.c
     fourth = basis.start + basis.directions @ found.c
-    mapping = flat_map(arm, FlatModel.EXACT)
-    law = response(fourth, second, mapping, problem.duration)
+    oscillator = problem.oscillator
+    law = response(fourth, second, oscillator, problem.duration)
     is_exact = problem.wanted.nominal is Nominal.EXACT
     return InsensitiveMotion(
         law=law,
         cost=found.cost,
-        boundary_residual=largest_miss(law, second, mapping, rests_at_end=is_exact),
+        boundary_residual=largest_miss(law, second, oscillator, rests_at_end=is_exact),
         stationarity=found.stationarity,
     )
-
-
-def _residuals(
-    oscillator: Oscillator, factors: FloatArray, duration: float, basis: MomentumBasis
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Return residuals per rad as matrix @ c + start, real parts above imaginary ones.
-
-    Parameters
-    ----------
-    oscillator, factors
-        Nominal arm, and arms as factors on its stiffness and damping, shape (p, 2) [-].
-    duration, basis
-        Length of the motion [s], and what the coefficients c mean.
-
-    Returns
-    -------
-    tuple[FloatArray, FloatArray]
-        Shapes (2 p, modes) and (2 p,) [-].
-
-    """
-    rows = legendre_residuals(oscillator, factors, duration, len(basis.second_start))
-    stacked = np.concatenate([rows.real, rows.imag])
-    return stacked @ basis.second_directions, stacked @ basis.second_start
 
 
 def _search(

@@ -13,19 +13,21 @@
 # limitations under the License.
 
 """
-Momentum angle: laws of the planned variable that are shaped by their effort.
+Momentum angle: laws of the planned variable that are shaped by what drives joint n-1.
 
 The momentum angle sigma is the angle that the last two links would have if they were one rigid
-body: I*_(n-1) sigma'' = tau, whatever the spring does ((I4) of docs/derivation.md). Any effort is
-therefore a sigma, expanded here in Legendre polynomials, and the planned variable w answers to it
-like an oscillator: w + delta w' + w'' / omega^2 = sigma.
+body: I*_(n-1) sigma'' = tau, whatever the spring does ((I4) of docs/derivation.md). Where a servo
+drives the joint, sigma stands for the angle of link n-1 (I16). Either is expanded here in Legendre
+polynomials, and the planned variable w answers to it like the passive joint's oscillator:
+w + delta w' + w'' / omega^2 = sigma.
 """
 
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, sqrt
 
-from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import apply_row, Drive, FloatArray, PlanarArm
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
 from flat_planner_ros.core.motion_law import JET_ORDER, ScaledLaw
 import numpy as np
 from numpy.polynomial import legendre
@@ -58,6 +60,9 @@ PROBES = 65
 SPARE_TERMS = 20
 """Terms beyond those, after which the coefficients have decayed below roundoff."""
 
+MAX_NODES = 2048
+"""Most nodes at which the effort of a servo is weighed; then a period has three or more."""
+
 BASES_KEPT = 8
 """Bases of different size that are remembered."""
 
@@ -65,21 +70,21 @@ BASES_KEPT = 8
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MomentumBasis:
     """
-    All momentum angles from -1/2 to 1/2 within a space of polynomials, x in [-1, 1].
+    All sigmas from -1/2 to 1/2 within a space of polynomials, x in [-1, 1].
 
     The law with coefficients c has sigma^(4) = `start` + `directions` @ c, and the integral of
-    sigma''^2 is `least` + c @ c.
+    (effort / I*_(n-1))^2 is `least` + c @ c.
 
     Attributes
     ----------
     start
         Legendre coefficients of sigma^(4) of the law of least effort in the space, shape (m,).
     directions
-        Those of changes, whose sigma'' are orthonormal, shape (m, modes).
+        Those of changes, whose efforts are orthonormal, shape (m, modes).
     second_start, second_directions
         Legendre coefficients of sigma'' of both, shapes (m + 2,) and (m + 2, modes).
     least
-        Integral of sigma''^2 of `start`.
+        Integral of (effort / I*_(n-1))^2 of `start`.
 
     """
 
@@ -111,7 +116,7 @@ class MomentumBasis:
 
 
 LEAST_OF_ALL = 1.5
-"""Integral of sigma''^2 of a linear sigma'', the least of any motion from -1/2 to 1/2."""
+"""Integral of (effort / I*_(n-1))^2, linear in time, the least of any motion over 1."""
 
 
 def least_effort(arm: PlanarArm, distance: float, duration: float) -> float:
@@ -130,25 +135,86 @@ def momentum_basis(modes: int) -> MomentumBasis:
     start = np.zeros(size)
     fourth = legendre.legder(speed / (2.0 * speed[0]), CONTACT)
     start[: len(fourth)] = fourth
+    # Integrals of `start` lack their constants: sigma'' of the polynomial of least degree.
+    second = np.zeros(size + 2)
+    exact = legendre.legder(speed / (2.0 * speed[0]), 1)
+    second[: len(exact)] = exact
     once = integration(size + 2)
     twice = (once @ once)[:, :size]
-    norm = np.sqrt(2.0 / (2.0 * np.arange(size + 2.0) + 1.0))
-    orthonormal, triangle = np.linalg.qr(norm[:, None] * (twice @ changes))
-    directions = np.linalg.solve(triangle.T, changes.T).T
-    # `start` still lacks constants of integration: sigma'' of the polynomial of least degree.
-    second_start = np.zeros(size + 2)
-    exact = legendre.legder(speed / (2.0 * speed[0]), 1)
-    second_start[: len(exact)] = exact
-    share = orthonormal.T @ (norm * second_start)
-    second_directions = orthonormal / norm[:, None]
-    second_start -= second_directions @ share
-    return MomentumBasis(
-        start=start - directions @ share,
-        directions=directions,
-        second_start=second_start,
-        second_directions=second_directions,
-        least=float(np.sum((norm * second_start) ** 2)),
+    seconds = np.column_stack([second, twice @ changes])
+    return _orthonormal(np.column_stack([start, changes]), seconds, _norms(size + 2) * seconds)
+
+
+def _norms(size: int) -> FloatArray:
+    """Return the norms of Legendre polynomials, shape (size, 1)."""
+    return np.sqrt(2.0 / (2.0 * np.arange(float(size)) + 1.0))[:, None]
+
+
+def _orthonormal(fourths: FloatArray, seconds: FloatArray, efforts: FloatArray) -> MomentumBasis:
+    """
+    Return the basis of laws whose efforts are orthonormal, and whose start has the least.
+
+    Parameters
+    ----------
+    fourths, seconds
+        Legendre coefficients of sigma^(4) and sigma'' of a law, then of changes of it, in columns.
+    efforts
+        Their efforts over I*_(n-1), in coordinates whose sum of squares is the integral.
+
+    """
+    orthonormal, triangle = np.linalg.qr(efforts[:, 1:])
+    share = orthonormal.T @ efforts[:, 0]
+    directions, second_directions = (
+        np.linalg.solve(triangle.T, columns[:, 1:].T).T for columns in (fourths, seconds)
     )
+    return MomentumBasis(
+        start=fourths[:, 0] - directions @ share,
+        directions=directions,
+        second_start=seconds[:, 0] - second_directions @ share,
+        second_directions=second_directions,
+        least=float(np.sum((efforts[:, 0] - orthonormal @ share) ** 2)),
+    )
+
+
+def basis_for(oscillator: Oscillator, duration: float, modes: int) -> MomentumBasis:
+    """
+    Return the basis whose efforts are orthonormal on an arm.
+
+    Parameters
+    ----------
+    oscillator
+        The nominal arm.
+    duration
+        Length of the motion [s].
+    modes
+        Number of free coefficients.
+
+    References
+    ----------
+    (I17) of docs/derivation.md: a servo takes I*_(n-1) sigma'' + I*_n q_n''.
+
+    """
+    basis = momentum_basis(modes)
+    if oscillator.drive is Drive.EFFORT:
+        return basis
+    fourths = np.column_stack([basis.start, basis.directions])
+    seconds = np.column_stack([basis.second_start, basis.second_directions])
+    delta, epsilon = _normalised(oscillator, duration)
+    reaction = epsilon / oscillator.inertia_ratio
+    if _is_split(fourths, epsilon):
+        laws = [_split(second, delta, epsilon, duration) for second in seconds.T]
+        nodes, weights = legendre.leggauss(min(len(seconds) + ceil(epsilon**-0.5), MAX_NODES))
+        distances = np.array([1.0 + nodes, 1.0 - nodes])
+        quiet = legendre.legval(nodes, seconds).T
+        swing = np.array([law.normalised_jet(distances, TOP)[TOP] for law in laws]).T
+        efforts = np.sqrt(weights)[:, None] * (quiet - reaction * swing)
+    else:
+        top = _top_derivative(fourths, delta, epsilon)
+        once = integration(len(top))
+        efforts = -reaction * once @ (once @ top)
+        efforts[: len(seconds)] += seconds
+        efforts *= _norms(len(top))
+    return _orthonormal(fourths, seconds, efforts)
 
 
 @lru_cache(maxsize=BASES_KEPT)
@@ -161,6 +227,17 @@ def integration(size: int) -> FloatArray:
             matrix[k + 1, k] = 1.0 / (2 * k + 1)
         if k > 0:
             matrix[k - 1, k] = -1.0 / (2 * k + 1)
+    matrix.setflags(write=False)
+    return matrix
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def differentiation(size: int) -> FloatArray:
+    """Return the matrix of the derivative on Legendre coefficients."""
+    # P_k' = (2 k - 1) P_(k-1) + (2 k - 5) P_(k-3) + ...
+    below, order = np.indices((size, size))
+    is_part = (order > below) & ((order - below) % 2 == 1)
+    matrix = np.where(is_part, 2.0 * below + 1.0, 0.0)
     matrix.setflags(write=False)
     return matrix
 
@@ -201,10 +278,10 @@ class SeriesLaw(ScaledLaw):
 
 
 def response(
-    fourth: FloatArray, second: FloatArray, flat_map: FlatMap, duration: float
+    fourth: FloatArray, second: FloatArray, oscillator: Oscillator, duration: float
 ) -> SeriesLaw:
     """
-    Return the planned variable from rest at -1/2 that follows a momentum angle.
+    Return the planned variable from rest at -1/2 that follows a sigma.
 
     Parameters
     ----------
@@ -212,8 +289,8 @@ def response(
         Legendre coefficients of sigma^(4) in x, shape (m,).
     second
         Those of sigma'', shape (m + 2,).
-    flat_map
-        Exact map of the arm.
+    oscillator
+        The nominal arm.
     duration
         Length of the motion [s].
 
@@ -222,17 +299,11 @@ def response(
     (I6) and (I10) of docs/derivation.md.
 
     """
-    half = 0.5 * duration
-    inner, damped, coupled = flat_map.effort[2:5].tolist()
-    delta, epsilon = damped / inner / half, coupled / inner / half**2
-    turn = epsilon**-0.5
-    if turn > SPLIT_TURN * len(fourth):
+    delta, epsilon = _normalised(oscillator, duration)
+    if _is_split(fourth, epsilon):
         return _split(second, delta, epsilon, duration)
-    size = len(fourth) + ceil(TERMS_PER_TURN * turn) + SPARE_TERMS
-    once = integration(size)
-    padded = np.zeros(size)
-    padded[: len(fourth)] = fourth
-    top = np.linalg.solve(epsilon * np.eye(size) + delta * once + once @ once, padded)
+    top = _top_derivative(fourth, delta, epsilon)
+    size = len(top)
     once = integration(size + JET_ORDER)
     table = np.zeros((JET_ORDER + 1, size + JET_ORDER))
     table[JET_ORDER, :size] = top
@@ -241,6 +312,21 @@ def response(
     table[0, 0] -= 0.5
     table.setflags(write=False)
     return SeriesLaw(duration=duration, table=table)
+
+
+def _is_split(fourth: FloatArray, epsilon: float) -> bool:
+    """Whether the natural oscillation is too fast for the polynomials of sigma."""
+    return bool(epsilon**-0.5 > SPLIT_TURN * len(fourth))
+
+
+def _top_derivative(fourth: FloatArray, delta: float, epsilon: float) -> FloatArray:
+    """Return Legendre coefficients of w^(6) of laws at rest at the start, one or in columns."""
+    size = len(fourth) + ceil(TERMS_PER_TURN * epsilon**-0.5) + SPARE_TERMS
+    once = integration(size)
+    padded = np.zeros((size, *fourth.shape[1:]))
+    padded[: len(fourth)] = fourth
+    operator = epsilon * np.eye(size) + delta * once + once @ once
+    return np.asarray(np.linalg.solve(operator, padded), dtype=float)
 
 
 def _split(second: FloatArray, delta: float, epsilon: float, duration: float) -> SeriesLaw:
@@ -252,12 +338,9 @@ def _split(second: FloatArray, delta: float, epsilon: float, duration: float) ->
     sigma[1] = once @ sigma[2]
     sigma[0] = once @ sigma[1]
     sigma[0, 0] -= 0.5
+    slope = differentiation(size)
     for k in range(3, JET_ORDER + 1):
-        derivative = legendre.legder(sigma[k - 1])
-        sigma[k, : len(derivative)] = derivative
-    slope = np.zeros((size, size))
-    for k in range(1, size):
-        slope[:k, k] = legendre.legder(np.eye(size)[k])[:k]
+        sigma[k] = slope @ sigma[k - 1]
     operator = np.eye(size) + delta * slope + epsilon * slope @ slope
     table = np.asarray(np.linalg.solve(operator, sigma.T).T, dtype=float)
     table.setflags(write=False)
@@ -269,19 +352,25 @@ def _split(second: FloatArray, delta: float, epsilon: float, duration: float) ->
     return SeriesLaw(duration=duration, table=table, rate=complex(rate), amplitude=amplitude)
 
 
+def _normalised(oscillator: Oscillator, duration: float) -> tuple[float, float]:
+    """Return delta and 1 / omega^2 of w + delta w' + w'' / omega^2 = sigma in x."""
+    half = 0.5 * duration
+    square = oscillator.frequency**2
+    return 2.0 * oscillator.decay / square / half, 1.0 / (square * half**2)
+
+
 def largest_miss(
-    law: SeriesLaw, second: FloatArray, mapping: FlatMap, *, rests_at_end: bool
+    law: SeriesLaw, second: FloatArray, oscillator: Oscillator, *, rests_at_end: bool
 ) -> float:
-    """Return the largest miss at the ends, and of the effort in between, relative to peaks."""
+    """Return the largest miss at the ends, and of sigma'' in between, relative to peaks."""
     half = 0.5 * law.duration
     times = np.linspace(0.0, law.duration, PROBES)
     jet = law.jet(times, JET_ORDER)
-    both = mapping.effort[2]
-    # sigma and its derivatives from w, by the row that takes w to I sigma''.
-    sigma = np.array([apply_row(mapping.effort[2:] / both, jet, k) for k in range(CONTACT + 1)])
+    delta, epsilon = _normalised(oscillator, law.duration)
+    row = np.array([1.0, delta * half, epsilon * half**2])
+    sigma = np.array([apply_row(row, jet, k) for k in range(CONTACT + 1)])
     expected = legendre.legval(times / half - 1.0, second) / half**2
-    effort = apply_row(mapping.effort, jet) / both
-    misses = [np.abs(effort - expected).max() / np.abs(expected).max()]
+    misses = [np.abs(sigma[2] - expected).max() / np.abs(expected).max()]
     misses += [_end_miss(jet[:JET_ORDER], 0), _end_miss(sigma, -1)]
     if rests_at_end:
         misses.append(_end_miss(jet[:JET_ORDER], -1))

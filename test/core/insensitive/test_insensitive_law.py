@@ -28,8 +28,8 @@ from flat_planner_ros.core.insensitive.insensitivity import (
 )
 from flat_planner_ros.core.insensitive.law import insensitive_motion
 from flat_planner_ros.core.insensitive.momentum_angle import least_effort
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
 from flat_planner_ros.core.insensitive.residual import (
-    Oscillator,
     predict_residual,
     residual_amplitude,
 )

@@ -16,7 +16,8 @@
 
 from core.conftest import ARM, envelope
 from flat_planner_ros.core.insensitive.insensitivity import Insensitivity, Nominal
-from flat_planner_ros.core.insensitive.residual import Oscillator, residual_amplitude
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
+from flat_planner_ros.core.insensitive.residual import residual_amplitude
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions

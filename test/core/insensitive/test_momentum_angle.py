@@ -22,6 +22,7 @@ from flat_planner_ros.core.insensitive.momentum_angle import (
     response,
     SPLIT_TURN,
 )
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
 import numpy as np
 from numpy.polynomial import legendre
 import pytest
@@ -61,7 +62,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
     fourth, second, _ = random_law(modes)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
     mapping = flat_map(ARM, FlatModel.EXACT)
-    law = response(fourth, second, mapping, duration)
+    law = response(fourth, second, Oscillator.of(ARM), duration)
     half = duration / 2.0
     inner, damped, coupled = mapping.effort[2:]
     sigma = legendre.legint(second, 2, lbnd=-1)
@@ -88,7 +89,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
 def test_derivatives_are_derivatives(share):
     fourth, second, _ = random_law(8)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
-    law = response(fourth, second, flat_map(ARM, FlatModel.EXACT), duration).transformed(2.0, 0.3)
+    law = response(fourth, second, Oscillator.of(ARM), duration).transformed(2.0, 0.3)
     t, h = np.linspace(0.1, 0.9, 9) * duration, 1e-5 * duration
     jet, after, before = law.jet(t, 8), law.jet(t + h, 8), law.jet(t - h, 8)
     slope = (after - before) / (2.0 * h)

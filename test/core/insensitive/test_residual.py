@@ -18,8 +18,8 @@ from core.conftest import ARM, ELBOW, envelope
 from flat_planner_ros.core.arm.errors import InvalidRequest
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.insensitive.insensitivity import UncertaintyBox
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
 from flat_planner_ros.core.insensitive.residual import (
-    Oscillator,
     predict_residual,
     residual_amplitude,
 )

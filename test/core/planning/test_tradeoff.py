@@ -20,7 +20,8 @@ from flat_planner_ros.core.arm.errors import InvalidRequest
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.insensitive.insensitivity import Insensitivity, Nominal
-from flat_planner_ros.core.insensitive.residual import Oscillator, residual_amplitude
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
+from flat_planner_ros.core.insensitive.residual import residual_amplitude
 from flat_planner_ros.core.insensitive.shapers import shaped_quintic, Shaper
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
