@@ -93,7 +93,7 @@ class InsensitiveMotion:
         residual taken by the criterion [-].
     boundary_residual
         Largest miss of a condition at the ends, relative to the derivative's peak [-].
-    stationarity
+    optimality_residual
         Gradient of the weighted sum of squares that the law minimises, relative to its terms [-].
 
     """
@@ -101,7 +101,7 @@ class InsensitiveMotion:
     law: SeriesLaw
     cost: float
     boundary_residual: float
-    stationarity: float
+    optimality_residual: float
 
 
 def insensitive_motion(
@@ -342,7 +342,7 @@ def _motion(problem: _Problem, found: _Compromise) -> InsensitiveMotion:
         law=law,
         cost=found.cost,
         boundary_residual=largest_miss(law, second, oscillator, rests_at_end=is_exact),
-        stationarity=found.stationarity,
+        optimality_residual=found.stationarity,
     )
 
 

@@ -186,7 +186,8 @@ class Strategy(Enum):
 
     The cost is the integral of the squared sixth derivative and of the squares in the row. A new
     strategy is a row here and a `Square`, a function as the ones above, for what is new in it; the
-    parameter `strategy`, the programs and their texts find it by its name.
+    parameter `strategy`, the programs and their texts find it by its name. One that is more than a
+    cost is told of in core/planning/strategies.py.
 
     Attributes
     ----------

@@ -30,6 +30,7 @@ from flat_planner_ros.core.planning.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+from flat_planner_ros.core.planning.strategies import check_options
 from flat_planner_ros.core.planning.tradeoff import (
     baselines,
     duration_advice,
@@ -41,8 +42,9 @@ from flat_planner_ros.core.planning.tradeoff import (
 __all__ = [
     'CONDITIONS',
     'Strategy',
-    'duration_advice',
     'baselines',
+    'check_options',
+    'duration_advice',
     'Extrema',
     'extrema_of',
     'JointLimits',

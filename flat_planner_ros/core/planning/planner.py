@@ -19,14 +19,12 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import (
-    FlatModel,
     FloatArray,
     InvalidRequest,
     PlanarArm,
     strict_arithmetic,
     UncertifiedPlan,
 )
-from flat_planner_ros.core.insensitive import insensitive_motion
 from flat_planner_ros.core.motion_law import (
     BoundaryConditions,
     CONDITIONS,
@@ -37,7 +35,6 @@ from flat_planner_ros.core.motion_law import (
     PathConditions,
     probes,
     stationarity_residual,
-    Strategy,
 )
 from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Plan
 from flat_planner_ros.core.planning.reference_trajectory import (
@@ -48,6 +45,7 @@ from flat_planner_ros.core.planning.reference_trajectory import (
     RestToRestTrajectory,
 )
 from flat_planner_ros.core.planning.request import MotionRequest, planned_at_rest, PlanningOptions
+from flat_planner_ros.core.planning.strategies import OWN_LAWS, OwnMotion
 import numpy as np
 
 NO_DISTANCE = 1e-100
@@ -87,9 +85,9 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
         if request.via:
             found = _through_points(request, options, problem)
         elif request.start_jets is not None:
-            if options.strategy is Strategy.INSENSITIVE:
-                # It has no law from a start in motion; the problem's cost is the polynomial one.
-                options = replace(options, strategy=Strategy.POLYNOMIAL)
+            own = OWN_LAWS.get(options.strategy)
+            if own is not None:
+                options = replace(options, strategy=own.in_motion)
             found = _from_motion(request, problem, request.start_jets)
         else:
             found = _from_rest(request, options, problem)
@@ -123,8 +121,10 @@ def _from_rest(
     )
     if not all(abs(distance) < problem.reach for distance in distances):
         raise UncertifiedPlan('boundary residual', inf, BOUNDARY_TOLERANCE)
-    if options.strategy is Strategy.INSENSITIVE and distances[0]:
-        return _insensitive(options, problem, start, final)
+    own = OWN_LAWS.get(options.strategy)
+    if own is not None and distances[0]:
+        motion = own.motion(problem.arm, options, problem.duration, final[0] - start[0])
+        return _with_own_law(motion, problem, start, final)
     trajectory = RestToRestTrajectory(
         problem=problem, start=start, final=final, distances=distances
     )
@@ -134,39 +134,35 @@ def _from_rest(
     return _Certified(trajectory, unit.boundary_residual, unit.optimality_residual)
 
 
-def _insensitive(
-    options: PlanningOptions,
+def _with_own_law(
+    motion: OwnMotion,
     problem: MotionProblem,
     start: tuple[float, ...],
     final: tuple[float, ...],
 ) -> _Certified:
     """
-    Return the trajectory of an insensitive motion.
+    Return the trajectory whose first planned variable has a law of its own.
 
     Only joint n-1 can excite or quiet the oscillation, and only the first planned variable tells
     its effort: the others move by the problem's law, in the same time.
     """
-    if options.flat_model is not FlatModel.EXACT:
-        raise InvalidRequest('strategy insensitive needs flat_model exact')
-    distance = final[0] - start[0]
-    shaped = insensitive_motion(problem.arm, problem.duration, options.insensitivity, distance)
     others = (
         problem.unit.law_over(problem.duration, end - begin, 0.5 * (begin + end))
         for begin, end in zip(start[1:], final[1:], strict=True)
     )
     trajectory = LawTrajectory(
         problem=problem,
-        laws=(shaped.law.transformed(distance, 0.5 * (start[0] + final[0])), *others),
+        laws=(motion.law.transformed(final[0] - start[0], 0.5 * (start[0] + final[0])), *others),
         start=_rest(start),
         final=np.array(final),
         edges=(0.0, problem.duration),
-        own_cost=shaped.cost,
+        own_cost=motion.cost,
     )
     unit = problem.unit
     return _Certified(
         trajectory,
-        max(unit.boundary_residual, shaped.boundary_residual),
-        max(unit.optimality_residual, shaped.stationarity),
+        max(unit.boundary_residual, motion.boundary_residual),
+        max(unit.optimality_residual, motion.optimality_residual),
     )
 
 
@@ -218,8 +214,9 @@ def _through_points(
     request: MotionRequest, options: PlanningOptions, problem: MotionProblem
 ) -> _Certified:
     """Return the trajectory whose flat outputs pass given values on the way."""
-    if options.strategy is Strategy.INSENSITIVE:
-        raise InvalidRequest('strategy insensitive has no via points; another strategy has')
+    if options.strategy in OWN_LAWS:
+        name = options.strategy.value
+        raise InvalidRequest(f'strategy {name} has no via points; another strategy has')
     path = path_of(request, problem)
     found = optimal_path(problem.cost, path)
     trajectory = LawTrajectory(

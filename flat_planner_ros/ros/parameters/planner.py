@@ -19,10 +19,9 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isqrt
 
-from flat_planner_ros.core.arm import flat_map, FlatModel
-from flat_planner_ros.core.insensitive import check_insensitivity
-from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy, strategy_cost
-from flat_planner_ros.core.planning import JointLimits, OnViolation, PlanningOptions
+from flat_planner_ros.core.arm import FlatModel
+from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy
+from flat_planner_ros.core.planning import check_options, JointLimits, OnViolation, PlanningOptions
 from flat_planner_ros.core.session import SessionSettings, StartSource
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
@@ -277,18 +276,8 @@ def build(values: Values) -> PlannerSettings:
         compensate_friction=values['compensate_friction'],
         insensitivity=insensitivity_of(values),
     )
-    if options.strategy is Strategy.INSENSITIVE:
-        if options.flat_model is not FlatModel.EXACT:
-            raise InvalidParameter('strategy insensitive needs flat_model: exact')
-        check_insensitivity(arm, options.insensitivity)
-    # Builds the cost once, so that an inadmissible one is refused here and not at the next goal.
-    strategy_cost(
-        options.strategy,
-        flat_map(arm, options.flat_model),
-        r=options.r,
-        p=options.p,
-        custom=options.custom,
-    )
+    # What admits no motion is refused here and not at the next goal.
+    check_options(arm, options)
     session = SessionSettings(
         joints=joints,
         arm=arm,

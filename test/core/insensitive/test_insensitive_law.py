@@ -363,7 +363,7 @@ def test_one_way_to_choose():
         Insensitivity(modes=100)
     request = MotionRequest(start=np.zeros(2), final=np.array([1.0, 0.0]), duration=1.0)
     approximate = PlanningOptions(strategy=Strategy.INSENSITIVE, flat_model=FlatModel.APPROXIMATE)
-    with pytest.raises(InvalidRequest, match='flat_model exact'):
+    with pytest.raises(InvalidRequest, match='flat_model: exact'):
         plan(request, ARM, approximate)
 
 
