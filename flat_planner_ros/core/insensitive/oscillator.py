@@ -95,7 +95,7 @@ class Oscillator:
 
     @property
     def gain_of_sigma(self) -> float:
-        """The same for each unit of sigma'', I*_(n-1) sigma'' being an effort [-]."""
+        """Return the same for each unit of sigma'', I*_(n-1) sigma'' being an effort [-]."""
         if self.drive is Drive.POSITION:
             return 1.0
         return self.inertia_ratio / (self.inertia_ratio - 1.0)
