@@ -17,8 +17,8 @@ Strategies that are more than a cost: how each is planned, and what it refuses.
 
 How to add a strategy:
 
-1. Make it a member of `Strategy` (motion_law/cost.py), whose values are the choices of the parameter
-   `strategy`, with the squares of its cost: that is all, if it is a quadratic cost.
+1. Make it a member of `Strategy` (motion_law/cost.py), whose values are the choices of the
+   parameter, with the squares of its cost: that is all, if it is a quadratic cost.
 2. If the first planned variable has a law of its own, write a function for it in a file of its
    wing, and an entry of `OWN_LAWS` here: how it is called, what it refuses, what stands in for it.
 3. What it can be told is a field of `PlanningOptions` (request.py), with rows in ros/parameters.
