@@ -16,20 +16,16 @@
 
 from pathlib import Path
 from textwrap import fill
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor import PlannedMotion, VibrationReport
+from flat_planner_ros.figures.file_plot import plt, with_gaps
+from matplotlib.axes import Axes
 import numpy as np
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MILLI = 1e3
 """Residuals are drawn in mrad."""
-
-LONGEST_STEP = 0.03
-"""Time between two joint states that a line bridges [s]."""
 
 TITLE_WIDTH = 110
 """Characters in a line of the title."""
@@ -57,14 +53,7 @@ def draw(
     path
         File to write; its suffix chooses the format.
 
-    Raises
-    ------
-    ImportError
-        matplotlib is not installed.
-
     """
-    from flat_planner_ros.figures.file_plot import plt
-
     elapsed = times - motion.start
     end = motion.end - motion.start
     last = max(end + report.window, float(elapsed[-1]) if elapsed.size else end)
@@ -85,7 +74,7 @@ def draw(
 
 
 def _draw_positions(
-    axis: 'Axes', motion: PlannedMotion, elapsed: FloatArray, positions: FloatArray, last: float
+    axis: Axes, motion: PlannedMotion, elapsed: FloatArray, positions: FloatArray, last: float
 ) -> None:
     """Draw each joint as planned and as measured."""
     times = np.append(motion.times, last)
@@ -100,7 +89,7 @@ def _draw_positions(
 
 
 def _draw_residual(
-    axis: 'Axes', report: VibrationReport, elapsed: FloatArray, residual: FloatArray, end: float
+    axis: Axes, report: VibrationReport, elapsed: FloatArray, residual: FloatArray, end: float
 ) -> None:
     """Draw how far each joint is from the plan, and the envelope fitted after the motion."""
     for joint, name in enumerate(report.joint_names):
@@ -112,7 +101,7 @@ def _draw_residual(
     axis.legend(loc='best', fontsize=8)
 
 
-def _draw_envelope(axis: 'Axes', report: VibrationReport, end: float, after: FloatArray) -> None:
+def _draw_envelope(axis: Axes, report: VibrationReport, end: float, after: FloatArray) -> None:
     """Draw the envelope of the oscillation after the motion, if one was fitted."""
     fit = report.fit
     if fit.amplitude is None or fit.decay is None or fit.bias is None or fit.drift is None:
@@ -127,7 +116,7 @@ def _draw_envelope(axis: 'Axes', report: VibrationReport, end: float, after: Flo
 
 
 def _draw_efforts(
-    axis: 'Axes', motion: PlannedMotion, elapsed: FloatArray, efforts: FloatArray
+    axis: Axes, motion: PlannedMotion, elapsed: FloatArray, efforts: FloatArray
 ) -> None:
     """Draw the efforts of the actuated joints."""
     for joint, name in enumerate(motion.joint_names[:-1]):
@@ -142,10 +131,9 @@ def _draw_efforts(
         axis.legend(loc='best', fontsize=8)
 
 
-def _plot(axis: 'Axes', times: FloatArray, values: FloatArray, **style: Any) -> None:
+def _plot(axis: Axes, times: FloatArray, values: FloatArray, **style: Any) -> None:
     """Draw a line that breaks where samples were lost."""
-    holes = np.flatnonzero(np.diff(times) > LONGEST_STEP) + 1
-    axis.plot(np.insert(times, holes, np.nan), np.insert(values, holes, np.nan), **style)
+    axis.plot(*with_gaps(times, values), **style)
 
 
 def _title(report: VibrationReport) -> str:

@@ -12,11 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""matplotlib's pyplot, drawing into files: a terminal without a display is enough."""
+"""
+What all figures share: pyplot, drawing into files, and lines that break where samples were lost.
 
+A terminal without a display is enough. Programs import the figures when one is asked for:
+matplotlib is an extra.
+"""
+
+from flat_planner_ros.core.arm import FloatArray
 import matplotlib as mpl
+import numpy as np
 
 mpl.use('Agg')
 from matplotlib import pyplot as plt  # noqa: E402  The backend is chosen before.
 
-__all__ = ['plt']
+__all__ = ['plt', 'with_gaps']
+
+LONGEST_STEP = 0.03
+"""Time between two joint states that a line bridges [s]."""
+
+
+def with_gaps(times: FloatArray, *tables: FloatArray) -> tuple[FloatArray, ...]:
+    """Return times and tables with NaN, which breaks a line, where joint states were lost."""
+    holes = np.flatnonzero(np.diff(times) > LONGEST_STEP) + 1
+    return tuple(np.insert(values, holes, np.nan, axis=0) for values in (times, *tables))

@@ -17,14 +17,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from flat_planner_ros.figures.paper_example import DURATION, Recording, Result
-import numpy as np
+from flat_planner_ros.figures.file_plot import plt, with_gaps
+from flat_planner_ros.figures.paper_example import DURATION, Result
+from matplotlib.ticker import MultipleLocator
 
 SHOWN_AFTER = 1.0
 """Time that is drawn after the end of the motion [s]."""
-
-LONGEST_STEP = 0.03
-"""Time between two joint states that a line bridges [s]."""
 
 TICKS = 0.5
 """Spacing of the marks on the time axis [s]."""
@@ -53,15 +51,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
     path
         File to write; its suffix chooses the format.
 
-    Raises
-    ------
-    ImportError
-        matplotlib is not installed.
-
     """
-    from flat_planner_ros.figures.file_plot import plt
-    from matplotlib.ticker import MultipleLocator
-
     scenarios = list(dict.fromkeys(result.scenario for result in results))
     figure, axes = plt.subplots(
         len(ROWS),
@@ -77,7 +67,7 @@ def draw(results: Sequence[Result], path: Path) -> None:
             if result.scenario != scenario:
                 continue
             colour, line = STYLES[result.strategy]
-            times, positions, efforts = _with_gaps(result.recording)
+            times, positions, efforts = with_gaps(*result.recording)
             for row, values in enumerate((positions[:, 0], positions[:, 1], efforts)):
                 axes[row, column].plot(times, values, line, color=colour, label=result.strategy)
         for row, label in enumerate(ROWS):
@@ -99,9 +89,3 @@ def draw(results: Sequence[Result], path: Path) -> None:
     figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
     figure.savefig(path, dpi=120)
     plt.close(figure)
-
-
-def _with_gaps(recording: Recording) -> Recording:
-    """Return a recording whose lines break where joint states were lost."""
-    holes = np.flatnonzero(np.diff(recording.times) > LONGEST_STEP) + 1
-    return Recording(*(np.insert(values, holes, np.nan, axis=0) for values in recording))

@@ -18,6 +18,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flat_planner_ros.core.planning import TradeoffPoint
+from flat_planner_ros.figures.file_plot import plt
+from matplotlib.lines import Line2D
 
 MARKS = {
     'polynomial': ('o', 'polynomial'),
@@ -46,15 +48,7 @@ def draw(points: Sequence[TradeoffPoint], box: str, path: Path) -> None:
     path
         File to write; its suffix chooses the format.
 
-    Raises
-    ------
-    ImportError
-        matplotlib is not installed.
-
     """
-    from flat_planner_ros.figures.file_plot import plt
-    from matplotlib.lines import Line2D
-
     figure, axis = plt.subplots(figsize=(9.0, 6.0))
     durations = sorted({point.duration for point in points if point.weight > 0.0})
     shades = plt.get_cmap('viridis')

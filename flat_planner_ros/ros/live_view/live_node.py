@@ -24,9 +24,12 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest
 from flat_planner_ros.ros.live_view.feed import Feed
-from flat_planner_ros.ros.parameters import planner as planner_parameters
-from flat_planner_ros.ros.parameters import plant as plant_parameters
-from flat_planner_ros.ros.parameters.row import InvalidParameter
+from flat_planner_ros.ros.live_view.page_settings import (
+    checked_value,
+    choices,
+    number_within,
+    SETTINGS,
+)
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -62,22 +65,6 @@ TEXT_LIMIT = 500
 """Longest text of a message that is shown [characters]."""
 
 NODES = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
-
-SETTINGS = {
-    interfaces.PLANNER: ('strategy', 'flat_model', 'weights.r', 'weights.p', 'auto_tune'),
-    interfaces.PLANT: (
-        'mismatch.stiffness_scale',
-        'mismatch.damping_scale',
-        'mismatch.inertia_scale',
-    ),
-}
-"""Parameters that the page shows and sets."""
-
-ROWS = {
-    interfaces.PLANNER: {row.name: row for row in planner_parameters.ROWS},
-    interfaces.PLANT: {row.name: row for row in plant_parameters.ROWS},
-}
-"""Rows of these parameters and of all others, by node and name."""
 
 SERVICES = {
     'replan': interfaces.topic_of(interfaces.PLANNER, interfaces.REPLAN),
@@ -115,7 +102,7 @@ class LiveNode(Node):
         super().__init__(LIVE_VIEW, **options)
         self.feed = Feed(STREAMS)
         self.feed.put('namespace', self.get_namespace())
-        self.feed.put('choices', _choices())
+        self.feed.put('choices', choices())
         self._joints: list[str] = []
         self._reader: conversions.JointStateReader | None = None
         self._epoch: float | None = None
@@ -318,10 +305,10 @@ class LiveNode(Node):
             raise InvalidRequest(f'a goal needs {len(joints)} positions, {", ".join(joints)}')
         if not self._goals.get_subscription_count():
             raise InvalidRequest('no planner is there to hear the goal')
-        time = stamps.duration_msg(_number(duration, 'duration', lower=0.0, upper=1e6))
+        time = stamps.duration_msg(number_within(duration, 'duration', lower=0.0, upper=1e6))
         point = JointTrajectoryPoint(
             positions=[
-                _number(value, name, lower=-1e9, upper=1e9)
+                number_within(value, name, lower=-1e9, upper=1e9)
                 for value, name in zip(positions, joints, strict=True)
             ],
             time_from_start=time,
@@ -340,13 +327,7 @@ class LiveNode(Node):
         for name, value in values.items():
             if name not in SETTINGS[node]:
                 raise InvalidRequest(f'{str(name)[:TEXT_LIMIT]} cannot be set here')
-            row = ROWS[node][name]
-            if isinstance(row.default, float):
-                value = _number(value, name)
-            elif type(value) is not type(row.default):
-                raise InvalidParameter(f'{name} must be a {type(row.default).__name__}')
-            row.check(value)
-            parameters.append(Parameter(name, value=value))
+            parameters.append(Parameter(name, value=checked_value(node, name, value)))
         results = (await client.set_parameters(parameters)).results
         refusals = [result.reason for result in results if not result.successful]
         await self._ask(node)
@@ -368,30 +349,3 @@ class LiveNode(Node):
 def _values(status: DiagnosticStatus) -> dict[str, str]:
     """Return the values of a status."""
     return {pair.key: pair.value[:TEXT_LIMIT] for pair in status.values}
-
-
-def _number(
-    value: Any, name: str, *, lower: float = -float('inf'), upper: float = float('inf')
-) -> float:
-    """Return a finite number within bounds."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidRequest(f'{name} must be a number')
-    if not (lower <= value <= upper and abs(value) < float('inf')):
-        raise InvalidRequest(f'{name} must be a number in [{lower:g}, {upper:g}]')
-    return float(value)
-
-
-def _choices() -> dict[str, dict[str, Any]]:
-    """Return what the page needs to know of the parameters that it sets."""
-    choices = {}
-    for node, names in SETTINGS.items():
-        choices[node] = {
-            name: {
-                'description': ROWS[node][name].description,
-                'allowed': ROWS[node][name].constraints,
-                'choices': list(ROWS[node][name].choices),
-                'kind': type(ROWS[node][name].default).__name__,
-            }
-            for name in names
-        }
-    return choices

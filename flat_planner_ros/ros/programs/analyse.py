@@ -17,7 +17,6 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 import json
 from pathlib import Path
 import sys
@@ -27,7 +26,7 @@ from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import MonitorSettings
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
-from flat_planner_ros.ros.programs.command_line import explain_missing
+from flat_planner_ros.ros.programs.command_line import explain_missing, missing_for_plot
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 from flat_planner_ros.ros.wire.message_types import message_class
 from rclpy.serialization import deserialize_message
@@ -74,8 +73,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
     """
     options = _parser().parse_args((sys.argv if args is None else args)[1:])
-    if options.plot is not None and find_spec('matplotlib') is None:
-        print('--plot needs matplotlib: pip install "flat_planner_ros[plot]"', file=sys.stderr)
+    if missing := missing_for_plot(options.plot):
+        print(missing, file=sys.stderr)
         return 1
     try:
         from flat_planner_ros.ros.recording.recording import Recording

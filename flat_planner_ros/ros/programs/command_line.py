@@ -15,6 +15,8 @@
 """Shared by the optional programs: their command lines, and a word on missing libraries."""
 
 from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
 import sys
 
 
@@ -42,3 +44,10 @@ def explain_missing(error: ImportError, extra: str) -> int:
     remedy = f'pip install "flat_planner_ros[{extra}]", or {library} itself'
     print(f'{library} is not installed: {remedy}', file=sys.stderr)
     return 1
+
+
+def missing_for_plot(path: Path | None) -> str:
+    """Return what a figure needs that is not installed, empty if nothing or no figure."""
+    if path is None or find_spec('matplotlib') is not None:
+        return ''
+    return '--plot needs matplotlib: pip install "flat_planner_ros[plot]"'

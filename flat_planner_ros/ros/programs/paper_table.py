@@ -19,7 +19,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import csv
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 import signal
 import subprocess
@@ -30,6 +29,7 @@ from flat_planner_ros.child_process import end_with_parent
 from flat_planner_ros.figures.paper_example import BEYOND, CASES, Method, Result, Scenario
 from flat_planner_ros.programs import INTERRUPTED
 from flat_planner_ros.ros.nodes.node_runner import signals_caught
+from flat_planner_ros.ros.programs.command_line import missing_for_plot
 from flat_planner_ros.ros.programs.paper_experiment import (
     Experimenter,
     ExperimentFailed,
@@ -99,8 +99,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
     """
     options = _options(remove_ros_args(args if args is not None else sys.argv)[1:])
-    if options.plot is not None and find_spec('matplotlib') is None:
-        print('--plot needs matplotlib: pip install "flat_planner_ros[plot]"', file=sys.stderr)
+    if missing := missing_for_plot(options.plot):
+        print(missing, file=sys.stderr)
         return 1
     for path in (options.plot, options.csv):
         if path is not None and not path.parent.is_dir():

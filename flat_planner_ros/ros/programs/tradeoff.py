@@ -23,7 +23,6 @@ from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 import csv
 from dataclasses import astuple, fields
-from importlib.util import find_spec
 from pathlib import Path
 import sys
 
@@ -36,6 +35,7 @@ from flat_planner_ros.core.planning import (
 )
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.programs.command_line import missing_for_plot
 from flat_planner_ros.ros.wire import interfaces
 import numpy as np
 
@@ -122,8 +122,8 @@ def _options(args: Sequence[str] | None) -> Namespace:
     parser.add_argument('--plot', metavar='FILE.png', type=Path, help='draw the picture')
     parser.add_argument('--csv', metavar='FILE', type=Path, help='write the numbers')
     options = parser.parse_args(args)
-    if options.plot is not None and find_spec('matplotlib') is None:
-        parser.error('--plot needs matplotlib: pip install "flat_planner_ros[plot]"')
+    if missing := missing_for_plot(options.plot):
+        parser.error(missing)
     return options
 
 
