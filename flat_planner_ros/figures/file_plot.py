@@ -20,13 +20,12 @@ matplotlib is an extra.
 """
 
 from flat_planner_ros.core.arm import FloatArray
-import matplotlib as mpl
+from matplotlib import pyplot as plt
 import numpy as np
 
-mpl.use('Agg')
-from matplotlib import pyplot as plt  # noqa: E402  The backend is chosen before.
-
 __all__ = ['plt', 'with_gaps']
+
+plt.switch_backend('Agg')
 
 LONGEST_STEP = 0.03
 """Time between two joint states that a line bridges [s]."""
