@@ -59,7 +59,7 @@ class PlanSamples:
     driving_effort
         Effort of joint n-1, which drives the passive one, without friction, shape (m,) [N m].
     arm, flat_map
-        From these to everything below.
+        Model by which joint motion and efforts follow from the planned variables.
     compensates_friction
         Whether the efforts include what friction takes.
 

@@ -37,10 +37,10 @@ class OnViolation(Enum):
     """What becomes of a motion whose prescribed duration is too short for the limits."""
 
     REJECT = 'reject'
-    """It is refused, with the shortest duration that is not."""
+    """Refused, with the shortest duration that is not."""
 
     SCALE = 'scale'
-    """It takes that duration instead."""
+    """Stretched to that duration."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

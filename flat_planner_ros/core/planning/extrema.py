@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 BoolArray = NDArray[np.bool_]
 
 DEGREE = 16
-"""Of the series on each segment."""
+"""Degree of the series on each segment."""
 
 TAIL = 3
 """Last coefficients of a series, whose size is taken for its error."""
@@ -60,14 +60,14 @@ DENSITY = 4
 """Places of the search for extrema per node of a segment."""
 
 NEWTON_STEPS = 4
-"""Enough to square the spacing of the search down to rounding."""
+"""Steps that square the spacing of the search down to rounding."""
 
 NEAR_PEAK = 0.1
 """Share of the range below the highest place within which every local extremum is refined [-]."""
 
 
 class Quantity(Enum):
-    """What limits are about."""
+    """Limited quantities."""
 
     POSITION = 'position'
     VELOCITY = 'velocity'
@@ -105,7 +105,7 @@ class Extrema(NamedTuple):
 
     @classmethod
     def of_samples(cls, times: FloatArray, values: FloatArray) -> 'Extrema':
-        """Return those among samples, of shape (m,) and (m, n)."""
+        """Return the extrema among samples, given times (m,) and values (m, n)."""
         low, high = values.argmin(axis=0), values.argmax(axis=0)
         return cls(values.min(axis=0), times[low], values.max(axis=0), times[high])
 
@@ -123,9 +123,9 @@ class _Mesh:
     Attributes
     ----------
     starts, lengths
-        Of the segments, shape (s,) [s].
+        Start and length of each segment, shape (s,) [s].
     values
-        At the nodes, shape (joint quantities, s, DEGREE + 1).
+        Values at the nodes, shape (joint quantities, s, DEGREE + 1).
     resolved
         Which segments hold their accuracy, shape (s,).
 
@@ -176,7 +176,7 @@ def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     scale, layer_scale = _Range(), _Range()
     done: list[tuple[FloatArray, FloatArray, FloatArray, BoolArray]] = []
     for halvings in range(MAX_ROUNDS + 1):
-        times = starts[:, None] + lengths[:, None] * _TABLES.places
+        times = starts[:, None] + lengths[:, None] * _FRACTIONS
         # The last node of a segment is the first of the next one, to the last bit.
         samples = plan.at(times.ravel())
         shape = (-1, len(starts), DEGREE + 1)
@@ -219,15 +219,15 @@ class _Range:
 
 def _tail(values: FloatArray) -> FloatArray:
     """Return the size of the last coefficients of series, shape (quantities, segments)."""
-    tail: FloatArray = np.abs(values @ _TABLES.to_tail).max(axis=-1)
+    tail: FloatArray = np.abs(values @ _TO_TAIL).max(axis=-1)
     return tail
 
 
 def _top_times(mesh: _Mesh) -> FloatArray:
     """Return when the negatives of all quantities, then the quantities, are largest [s]."""
     values = np.concatenate([-mesh.values, mesh.values])
-    series = values @ _TABLES.to_series
-    places = series @ _TABLES.to_search
+    series = values @ _TO_SERIES
+    places = series @ _TO_SEARCH
     if not mesh.resolved.all():
         # Between the nodes of a jump a series overshoots; each side is a node.
         nodes = np.repeat(values, DENSITY, axis=-1)[..., : places.shape[-1]]
@@ -239,7 +239,7 @@ def _top_times(mesh: _Mesh) -> FloatArray:
     tops[..., :-1] &= places[..., :-1] >= places[..., 1:]
     quantity, segment, place = np.nonzero(tops)
     x, heights = _refined(series[quantity, segment], place)
-    x = np.where(mesh.resolved[segment], x, _TABLES.search[place])
+    x = np.where(mesh.resolved[segment], x, _SEARCH[place])
     heights = np.where(mesh.resolved[segment], heights, places[tops])
     times = mesh.starts[segment] + mesh.lengths[segment] * (0.5 * (x + 1.0))
     # Sorted by quantity, then height: the last of each is the highest.
@@ -251,12 +251,12 @@ def _top_times(mesh: _Mesh) -> FloatArray:
 
 def _refined(series: FloatArray, place: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
     """Return the maxima of series near places of the search, by Newton's method, and values."""
-    search = _TABLES.search
+    search = _SEARCH
     low = search[np.maximum(place - 1, 0)]
     high = search[np.minimum(place + 1, len(search) - 1)]
     x = search[place]
-    slopes = series @ _TABLES.differentiation
-    bends = slopes @ _TABLES.differentiation
+    slopes = series @ _DIFFERENTIATION
+    bends = slopes @ _DIFFERENTIATION
     for _ in range(NEWTON_STEPS):
         basis = _basis(x)
         slope, bend = (slopes * basis).sum(axis=-1), (bends * basis).sum(axis=-1)
@@ -274,48 +274,26 @@ def _basis(x: FloatArray) -> FloatArray:
     return basis
 
 
-class _Tables(NamedTuple):
-    """
-    Matrices of one segment, -1 <= x <= 1; all are applied from the right.
+_NODES = -np.cos(np.pi * np.arange(DEGREE + 1.0) / DEGREE)
+"""Nodes of a segment -1 <= x <= 1, ascending."""
 
-    Attributes
-    ----------
-    places
-        Nodes as fractions of the segment, ascending.
-    to_series, to_tail
-        From values at the nodes to Chebyshev coefficients, to the last of them.
-    search
-        Places x of the search, every `DENSITY`-th one a node.
-    to_search
-        From coefficients to the values there.
-    differentiation
-        From coefficients to those of the derivative in x.
+_FRACTIONS = 0.5 * (_NODES + 1.0)
+"""The nodes as fractions of the segment."""
 
-    """
+_SEARCH = -np.cos(np.pi * np.arange(DENSITY * DEGREE + 1.0) / (DENSITY * DEGREE))
+"""Places x of the search, every `DENSITY`-th one a node."""
 
-    places: FloatArray
-    to_series: FloatArray
-    to_tail: FloatArray
-    search: FloatArray
-    to_search: FloatArray
-    differentiation: FloatArray
+# Matrices, applied from the right.
+_TO_SERIES = np.linalg.inv(_basis(_NODES)).T.astype(np.float64)
+"""From values at the nodes to Chebyshev coefficients."""
 
+_TO_TAIL = _TO_SERIES[:, -TAIL:].copy()
+"""From values at the nodes to the last coefficients."""
 
-def _tables() -> _Tables:
-    """Return the matrices of one segment."""
-    nodes, search = (-np.cos(np.pi * np.arange(m + 1.0) / m) for m in (DEGREE, DENSITY * DEGREE))
-    to_series = np.linalg.inv(_basis(nodes)).T.astype(np.float64)
-    unit = np.eye(DEGREE + 1)
-    differentiation = np.zeros_like(unit)
-    differentiation[:, :-1] = np.polynomial.chebyshev.chebder(unit, axis=1)
-    return _Tables(
-        places=0.5 * (nodes + 1.0),
-        to_series=to_series,
-        to_tail=to_series[:, -TAIL:].copy(),
-        search=search,
-        to_search=_basis(search).T,
-        differentiation=differentiation,
-    )
+_TO_SEARCH = _basis(_SEARCH).T
+"""From coefficients to the values at the places of the search."""
 
-
-_TABLES = _tables()
+_DIFFERENTIATION = np.pad(
+    np.polynomial.chebyshev.chebder(np.eye(DEGREE + 1), axis=1), ((0, 0), (0, 1))
+)
+"""From coefficients to those of the derivative in x."""

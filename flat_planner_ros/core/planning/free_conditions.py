@@ -186,7 +186,7 @@ def stop_plan(
     remaining
         Time that the motion would still take [s], the longest stop.
     limits
-        Of the joints, if there are any.
+        Limits of the joints, if there are any.
 
     """
     if jets is None:
@@ -243,6 +243,6 @@ def _end_costates(planned: Plan) -> FloatArray:
 
 
 def _pose(values: FloatArray) -> FloatArray:
-    """Return the joint angles at rest of given planned variables, the elastic joint relaxed."""
+    """Return the joint angles at rest of given planned variables, the passive joint relaxed."""
     inner = values[1:]
     return np.array([*inner, values[0] - inner.sum(), 0.0])

@@ -38,7 +38,7 @@ class LimitUse:
     Attributes
     ----------
     joint
-        Its index in kinematic order, from 0.
+        Index of the joint in kinematic order, from 0.
     quantity
         What is limited.
     value, limit

@@ -264,4 +264,4 @@ def _check_fit(request: MotionRequest, arm: PlanarArm) -> None:
         ends.insert(0, ('start', request.start))
     for name, angles in ends:
         if angles[-1] != 0.0:
-            raise InvalidRequest(f'{name} angle of the elastic joint is {angles[-1]:g} rad, not 0')
+            raise InvalidRequest(f'{name} angle of the passive joint is {angles[-1]:g} rad, not 0')

@@ -182,21 +182,11 @@ _kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
 
 def even_times(duration: float, intervals: int) -> FloatArray:
     """Return even times of a motion, both ends exact, read-only, shape (m,) [s]."""
-    if intervals > MAX_KEPT_INTERVALS:
-        return _times(duration, intervals)
-    return _kept_times(duration, intervals)
-
-
-def _times(duration: float, intervals: int) -> FloatArray:
-    """Return even times of a motion."""
     times = np.arange(intervals + 1.0)
     times /= intervals
     times *= duration
     times.setflags(write=False)
     return times
-
-
-_kept_times = lru_cache(maxsize=GRIDS_KEPT)(_times)
 
 
 class ReferenceTrajectory(Protocol):
@@ -318,7 +308,7 @@ class LawTrajectory:
     edges
         Times from the start to the end between which the laws are smooth [s].
     own_cost
-        Of laws that minimise something other than the problem's cost; None for the latter.
+        Cost of laws that minimise something other than the problem's; None where they do not.
 
     """
 

@@ -56,7 +56,7 @@ class MotionRequest:
     Attributes
     ----------
     start, final
-        Joint angles at both ends, the elastic joint relaxed, shape (n,) [rad].
+        Joint angles at both ends, the passive joint relaxed, shape (n,) [rad].
     duration
         Time to go from one to the other [s].
     via
@@ -134,13 +134,14 @@ class PlanningOptions:
     Attributes
     ----------
     strategy
-        Which cost.
+        Which cost; by default the one that has no weight to choose. The planner node's parameter
+        has a default of its own, the least effort, as its weights have defaults too.
     r, p
         Weights of effort and potential energy, as in `strategy_cost`.
     custom
         Q of the strategy `custom`, shape (6, 6).
     flat_model
-        Treatment of the damping of the elastic joint.
+        Treatment of the damping of the passive joint.
     compensate_friction
         Whether the efforts include what the motors' friction takes, as the model has it.
     insensitivity
@@ -201,7 +202,7 @@ class RequestRejected(FlatPlannerError):
     reason
         The rule that it breaks.
     message
-        The same as a sentence.
+        Sentence for people, with the numbers.
     joint
         The joint concerned, if one is.
     value, limit
@@ -234,7 +235,7 @@ def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:
     Parameters
     ----------
     angles
-        Of all joints, shape (n,) [rad].
+        Angles of all joints, shape (n,) [rad].
 
     Returns
     -------

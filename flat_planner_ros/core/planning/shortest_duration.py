@@ -66,7 +66,7 @@ class NoFeasibleDuration(FlatPlannerError):
     use
         The limit that is exceeded even by the least exceeding motion.
     duration
-        Of that motion [s].
+        Duration of that motion [s].
     shortest, longest
         The durations considered [s].
     at_end
@@ -96,13 +96,13 @@ class _Trial:
     Attributes
     ----------
     duration
-        It [s].
+        What was tried [s].
     plan
-        Its motion; None where there is no certified one.
+        Motion of that duration; None where there is no certified one.
     worst
         The limit of which that uses most; None where nothing is known.
     ratio
-        Its use [-].
+        Use of that limit [-].
     estimate
         Duration at which all limits would just be obeyed if peaks were powers of it [s].
     is_sampled
@@ -134,15 +134,15 @@ def shortest_plan(
     plan_of
         Plan of a duration [s].
     limits
-        Of its joints.
+        Limits of the joints.
     shortest, longest
         Range of the duration [s].
 
     Returns
     -------
     Plan
-        It obeys the limits, and with a duration shorter by `DURATION_TOLERANCE` it would not. No
-        duration on a grid of ratio `SCAN_STEP` down to 1 / `SCAN_DEPTH` of it does either.
+        Motion that obeys the limits; with a duration shorter by `DURATION_TOLERANCE` it would
+        not. No duration on a grid of ratio `SCAN_STEP` down to 1 / `SCAN_DEPTH` of it does either.
 
     Raises
     ------

@@ -79,7 +79,7 @@ class SessionSettings:
     start_delay
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
-        The same while another motion is under way or waits for its start [s].
+        From accepting a goal to its start while another motion is under way or waits [s].
     replan_tolerance
         Largest distance of a measured actuated joint from what was planned for that time at which
         another motion may take over [rad]; 0 for any.

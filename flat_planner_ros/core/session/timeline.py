@@ -31,6 +31,9 @@ import numpy as np
 SPLICE_TOLERANCE = 1e-6
 """Points of an old motion this close to the start of the next one give way to its first [s]."""
 
+TABLES = ('positions', 'velocities', 'accelerations', 'efforts')
+"""Joint motion and effort, one row for each point."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
@@ -93,9 +96,9 @@ class Track:
     start
         Absolute time of the first point [s].
     times
-        Of the points from the start, strictly increasing from 0, shape (m,) [s].
+        Time of each point from the start, strictly increasing from 0, shape (m,) [s].
     positions, velocities, accelerations, efforts
-        Of all joints, shape (m, n) [rad, rad/s, rad/s^2, N m].
+        Motion and effort of all joints, shape (m, n) [rad, rad/s, rad/s^2, N m].
     flat
         Derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k].
 
@@ -180,28 +183,22 @@ class Timeline:
         left = self.after(now).motions or self.motions[-1:]
         first = left[0]
         begun = int(np.searchsorted(first.samples.times, now - first.start, side='right')) - 1
+        begun = max(begun, 0)
         # Later points stay on the old grid to the last bit: what is being played does not change.
-        origin = float(first.samples.times[max(begun, 0)])
+        origin = float(first.samples.times[begun])
         start = first.start + origin
-        pieces = []
+        times, flat = [], []
+        tables: dict[str, list[FloatArray]] = {name: [] for name in TABLES}
         for motion, after in zip(left, [*left[1:], None], strict=True):
             until = np.inf if after is None else after.start - SPLICE_TOLERANCE - motion.start
             end = int(np.searchsorted(motion.samples.times, until))
-            pieces.append((motion.samples, slice(max(begun, 0) if motion is first else 0, end)))
-        shifts = [-origin, *(motion.start - start for motion in left[1:])]
+            chosen = slice(begun if motion is first else 0, end)
+            shift = -origin if motion is first else motion.start - start
+            times.append(motion.samples.times[chosen] + shift)
+            flat.append(motion.samples.flat[:, :, chosen])
+            for name, parts in tables.items():
+                parts.append(getattr(motion.samples, name)[chosen])
+        joined = {name: np.concatenate(parts) for name, parts in tables.items()}
         return Track(
-            start=start,
-            times=np.concatenate(
-                [
-                    samples.times[chosen] + shift
-                    for (samples, chosen), shift in zip(pieces, shifts, strict=True)
-                ]
-            ),
-            flat=np.concatenate([samples.flat[:, :, chosen] for samples, chosen in pieces], 2),
-            **{
-                name: np.concatenate(
-                    [getattr(samples, name)[chosen] for samples, chosen in pieces]
-                )
-                for name in ('positions', 'velocities', 'accelerations', 'efforts')
-            },
+            start=start, times=np.concatenate(times), flat=np.concatenate(flat, axis=2), **joined
         )
