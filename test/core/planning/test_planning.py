@@ -559,8 +559,8 @@ def test_a_request_keeps_locked_copies():
 @pytest.mark.parametrize(
     ('start', 'final', 'message'),
     [
-        ([0.0, 0.01], [1.0, 0.0], r'start angle of the elastic joint is 0\.01 rad'),
-        ([0.0, 0.0], [1.0, -0.02], r'final angle of the elastic joint is -0\.02 rad'),
+        ([0.0, 0.01], [1.0, 0.0], r'start angle of the passive joint is 0\.01 rad'),
+        ([0.0, 0.0], [1.0, -0.02], r'final angle of the passive joint is -0\.02 rad'),
         ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 'the arm has 2 joints, the request 3 angles'),
     ],
 )
