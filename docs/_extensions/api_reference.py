@@ -32,6 +32,9 @@ def entry(module: str, name: str) -> list[str]:
     if inspect.isclass(value):
         fields = ','.join(getattr(value, '_fields', ()))
         kind, options = 'autoclass', ['   :members:', f'   :exclude-members: {fields}']
+        bases = [base for base in value.__bases__ if base.__module__.startswith(CORE)]
+        if bases and not issubclass(value, Exception):
+            options.append('   :inherited-members:')
     elif inspect.isfunction(value):
         kind, options = 'autofunction', []
     elif isinstance(value, GenericAlias):

@@ -14,7 +14,13 @@
 
 """Arm: the model. Links, dynamics, counterbalances, flat map; its errors and measured samples."""
 
-from flat_planner_ros.core.arm.arrays import ComplexArray, FloatArray
+from flat_planner_ros.core.arm.arrays import (
+    check_number,
+    checked_array,
+    ComplexArray,
+    FloatArray,
+    locked,
+)
 from flat_planner_ros.core.arm.counterbalance import (
     Counterbalances,
     counterbalances,
@@ -50,6 +56,8 @@ __all__ = [
     'ArmDescription',
     'bodies_from_links',
     'bodies_from_reduced',
+    'check_number',
+    'checked_array',
     'ComplexArray',
     'ControlBlock',
     'Counterbalances',
@@ -67,14 +75,15 @@ __all__ = [
     'InvalidRequest',
     'JointSample',
     'LinkBody',
+    'locked',
     'NaturalMode',
     'NotFlat',
     'OutOfReach',
     'PlanarArm',
     'PLUGINS',
-    'suggest_counterbalances',
     'SampledMotion',
     'strict_arithmetic',
+    'suggest_counterbalances',
     'UncertifiedLoop',
     'UncertifiedPlan',
     'urdf_of',

@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Arrays: their type, and linear algebra of one vector or of a stack of vectors."""
+"""Arrays and numbers: checked and locked, and linear algebra of one vector or of a stack."""
 
 from collections.abc import Callable
 from functools import cache
+from math import inf, isfinite
 
+from flat_planner_ros.core.arm.errors import FlatPlannerError, InvalidModel
 import numpy as np
 import numpy.typing as npt
 
@@ -25,6 +27,67 @@ FloatArray = npt.NDArray[np.float64]
 
 ComplexArray = npt.NDArray[np.complex128]
 """The same for complex values."""
+
+
+def locked(array: FloatArray) -> FloatArray:
+    """Return the very same array, which nobody can write to any more."""
+    array.setflags(write=False)
+    return array
+
+
+def checked_array(
+    name: str,
+    values: npt.ArrayLike,
+    unit: str,
+    *,
+    shape: tuple[int, ...] | None = None,
+    lower: float = -inf,
+    error: type[FlatPlannerError] = InvalidModel,
+) -> FloatArray:
+    """
+    Return a locked copy of finite numbers.
+
+    Parameters
+    ----------
+    name, values, unit
+        What an error calls them, the numbers, and their unit.
+    shape
+        Shape that they must have; any by default.
+    lower
+        Least number that is allowed.
+    error
+        What is raised, with the first thing that is wrong.
+
+    """
+    array = np.array(values, dtype=float, order='C')
+    if shape is not None and array.shape != shape:
+        wanted = f'{shape[0]} entries' if len(shape) == 1 else f'shape {shape}'
+        raise error(f'{name} must have {wanted}, got shape {array.shape}')
+    is_finite = np.isfinite(array)
+    if not is_finite.all():
+        raise error(f'{name} must be finite, got {array[~is_finite][0]} {unit}')
+    if (array < lower).any():
+        raise error(f'{name} must be at least {lower:g} {unit}, got {array.min():g}')
+    return locked(array)
+
+
+def check_number(
+    name: str,
+    value: float,
+    unit: str,
+    *,
+    above: float = -inf,
+    lower: float = -inf,
+    error: type[FlatPlannerError] = InvalidModel,
+) -> None:
+    """Refuse a number that is not finite, or not above one bound, or below another."""
+    if isfinite(value) and value > above and value >= lower:
+        return
+    if above > -inf:
+        raise error(f'{name} must be finite and above {above:g} {unit}, got {value:g}')
+    if lower > -inf:
+        raise error(f'{name} must be finite and at least {lower:g} {unit}, got {value:g}')
+    raise error(f'{name} must be finite, got {value} {unit}')
 
 
 def applied(matrix: FloatArray, vector: FloatArray) -> FloatArray:

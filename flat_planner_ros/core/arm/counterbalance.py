@@ -21,9 +21,8 @@ docs/derivation.md). Link n comes first: its counterbalance rides on link n-1.
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm.arrays import FloatArray
+from flat_planner_ros.core.arm.arrays import checked_array, FloatArray
 from flat_planner_ros.core.arm.errors import InvalidModel
-from flat_planner_ros.core.arm.links import checked_vector
 import numpy as np
 import numpy.typing as npt
 
@@ -81,14 +80,14 @@ def counterbalances(
         raise InvalidModel(f'an arm must have at least {BALANCED} links, got {n}')
     if (mass is None) == (arm is None):
         raise InvalidModel('give either the masses of the counterbalances or their arms')
-    length = checked_vector('link_length', link_length, n, 'm', 0.0)
-    com = checked_vector('link_com', link_com, n, 'm')
-    own = checked_vector('link_mass', link_mass, n, 'kg', 0.0)
+    length = checked_array('link_length', link_length, 'm', shape=(n,), lower=0.0)
+    com = checked_array('link_com', link_com, 'm', shape=(n,))
+    own = checked_array('link_mass', link_mass, 'kg', shape=(n,), lower=0.0)
     masses, arms = np.zeros(BALANCED), np.zeros(BALANCED)
     if mass is not None:
-        masses = checked_vector('counterbalance_mass', mass, BALANCED, 'kg', 0.0).copy()
+        masses = _checked_pair('counterbalance_mass', mass, 'kg')
     if arm is not None:
-        arms = checked_vector('counterbalance_arm', arm, BALANCED, 'm', 0.0).copy()
+        arms = _checked_pair('counterbalance_arm', arm, 'm')
     given, wanted = (masses, arms) if arm is None else (arms, masses)
     rider = 0.0
     for i in (n - 1, n - 2):
@@ -178,9 +177,9 @@ def displaced_com(
 
     """
     n = np.size(link_mass)
-    com = checked_vector('link_com', link_com, n, 'm').copy()
-    mass = checked_vector('link_mass', link_mass, n, 'kg', 0.0)
-    moments = checked_vector('imbalance', imbalance, BALANCED, 'kg m')
+    com = checked_array('link_com', link_com, 'm', shape=(n,)).copy()
+    mass = checked_array('link_mass', link_mass, 'kg', shape=(n,), lower=0.0)
+    moments = checked_array('imbalance', imbalance, 'kg m', shape=(BALANCED,))
     for j, moment in enumerate(moments.tolist()):
         i = n - BALANCED + j
         if moment and not mass[i]:
@@ -188,3 +187,8 @@ def displaced_com(
         if moment:
             com[i] += moment / mass[i]
     return com
+
+
+def _checked_pair(name: str, values: npt.ArrayLike, unit: str) -> FloatArray:
+    """Return a copy of one number for each counterbalance, none below 0."""
+    return checked_array(name, values, unit, shape=(BALANCED,), lower=0.0).copy()

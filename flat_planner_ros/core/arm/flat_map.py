@@ -24,7 +24,7 @@ I_n (I_{n-1} - I_n) / k.
 from dataclasses import dataclass
 from enum import Enum
 
-from flat_planner_ros.core.arm.arrays import FloatArray
+from flat_planner_ros.core.arm.arrays import FloatArray, locked
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 import numpy as np
 
@@ -64,7 +64,7 @@ class FlatMap:
     def __post_init__(self) -> None:
         """Lock the rows."""
         for row in (self.output, self.deflection, self.effort):
-            row.setflags(write=False)
+            locked(row)
 
     @property
     def relaxation(self) -> float:

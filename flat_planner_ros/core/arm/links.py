@@ -14,10 +14,10 @@
 
 """Links of an arm: summed up to its constants, and as the rigid bodies that simulators want."""
 
-from math import inf, sqrt
+from math import sqrt
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm.arrays import FloatArray
+from flat_planner_ros.core.arm.arrays import check_number, checked_array, FloatArray
 from flat_planner_ros.core.arm.errors import InvalidModel
 import numpy as np
 import numpy.typing as npt
@@ -58,12 +58,12 @@ def checked_links(
     length: npt.ArrayLike, com: npt.ArrayLike, mass: npt.ArrayLike, inertia: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the four link arrays, checked."""
-    n = np.size(length)
+    shape = (np.size(length),)
     return (
-        checked_vector('link_length', length, n, 'm', 0.0),
-        checked_vector('link_com', com, n, 'm'),
-        checked_vector('link_mass', mass, n, 'kg', 0.0),
-        checked_vector('link_inertia', inertia, n, 'kg m^2', 0.0),
+        checked_array('link_length', length, 'm', shape=shape, lower=0.0),
+        checked_array('link_com', com, 'm', shape=shape),
+        checked_array('link_mass', mass, 'kg', shape=shape, lower=0.0),
+        checked_array('link_inertia', inertia, 'kg m^2', shape=shape, lower=0.0),
     )
 
 
@@ -72,19 +72,24 @@ def per_motor(value: npt.ArrayLike | None, motors: int) -> FloatArray:
     return np.zeros(motors) if value is None else np.array(value, dtype=float)
 
 
-def checked_vector(
-    name: str, value: npt.ArrayLike, size: int, unit: str, lower: float = -inf
-) -> FloatArray:
-    """Return a locked copy, shape (size,), of finite numbers not below a bound."""
-    array = np.array(value, dtype=float)
-    if array.shape != (size,):
-        raise InvalidModel(f'{name} must have {size} entries, got shape {array.shape}')
-    if not np.isfinite(array).all():
-        raise InvalidModel(f'{name} must be finite, got {array} {unit}')
-    if (array < lower).any():
-        raise InvalidModel(f'{name} must be at least {lower:g} {unit}, got {array.min():g}')
-    array.setflags(write=False)
-    return array
+def checked_inertia_star(inertia_star: npt.ArrayLike) -> tuple[float, float]:
+    """Return I*_{n-1} and I*_n [kg m^2] if they are those of two links."""
+    both, last = checked_array('inertia_star', inertia_star, 'kg m^2', shape=(2,)).tolist()
+    if not both > last > 0.0:
+        raise InvalidModel(
+            f'inertia_star must satisfy I*_(n-1) > I*_n > 0 kg m^2, got {both:g}, {last:g}'
+        )
+    return both, last
+
+
+def checked_counterbalances(
+    mass: npt.ArrayLike, arm: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Return masses [kg] and arms [m] of two counterbalances, shape (2,) each."""
+    return (
+        checked_array('counterbalance_mass', mass, 'kg', shape=(2,), lower=0.0),
+        checked_array('counterbalance_arm', arm, 'm', shape=(2,), lower=0.0),
+    )
 
 
 def check_definite(inertia: FloatArray) -> None:
@@ -193,8 +198,7 @@ def bodies_from_links(
     """
     links = checked_links(link_length, link_com, link_mass, link_inertia)
     n = links[0].size
-    weights = checked_vector('counterbalance_mass', counterbalance_mass, 2, 'kg', 0.0)
-    arms = checked_vector('counterbalance_arm', counterbalance_arm, 2, 'm', 0.0)
+    weights, arms = checked_counterbalances(counterbalance_mass, counterbalance_arm)
     added = [(0.0, 0.0)] * (n - 2) + list(zip(weights.tolist(), arms.tolist(), strict=True))
     rows = zip(*(array.tolist() for array in links), strict=True)
     return tuple(_balanced(*row, *extra) for row, extra in zip(rows, added, strict=True))
@@ -229,19 +233,14 @@ def bodies_from_reduced(
         The arrays have different lengths or numbers without a meaning.
 
     """
-    both, last = checked_vector('inertia_star', inertia_star, 2, 'kg m^2').tolist()
-    if not both > last > 0.0:
-        raise InvalidModel(
-            f'inertia_star must satisfy I*_(n-1) > I*_n > 0 kg m^2, got {both:g}, {last:g}'
-        )
+    both, last = checked_inertia_star(inertia_star)
     links = checked_links(link_length, link_com, link_mass, link_inertia)
-    (tip,) = checked_vector('tip_mass', [tip_mass], 1, 'kg', 0.0).tolist()
-    own = both - last
+    check_number('tip_mass', tip_mass, 'kg', lower=0.0)
+    tip, own = tip_mass, both - last
     is_free = not links[0].size  # of two joints' mass nothing is known: it rests on the base
     if drawn_length is not None:
-        (length,) = checked_vector('drawn_length', [drawn_length], 1, 'm', 0.0).tolist()
-        if length == 0.0:
-            raise InvalidModel('drawn_length must be above 0 m, got 0')
+        check_number('drawn_length', drawn_length, 'm', above=0.0)
+        length = drawn_length
     else:
         length = DRAWN_LENGTH if is_free or tip == 0.0 else sqrt(own / (2.0 * tip))
     share = own / (2.0 * length**2)

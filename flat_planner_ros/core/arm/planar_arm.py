@@ -12,42 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Dynamics of a planar serial arm whose last joint is elastic and not actuated.
-
-The absolute link angles make one constant matrix and one constant vector describe every such arm,
-balanced or not (docs/derivation.md).
-"""
+"""Planar serial arm whose last joint is elastic and not actuated: its constants, checked."""
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
-from math import sqrt
-from typing import NamedTuple, TypeVar
+from math import inf, sqrt
+from typing import NamedTuple
 
-from flat_planner_ros.core.arm.arrays import applied, FloatArray, last_of, solved, times_matrix
+from flat_planner_ros.core.arm.arrays import check_number, checked_array, FloatArray, locked
+from flat_planner_ros.core.arm.dynamics import ArmDynamics
 from flat_planner_ros.core.arm.errors import InvalidModel, NotFlat
 from flat_planner_ros.core.arm.links import (
     chain_load,
     check_definite,
     check_realizable,
+    checked_counterbalances,
+    checked_inertia_star,
     checked_links,
-    checked_vector,
     per_motor,
 )
 import numpy as np
 import numpy.typing as npt
 
-Real = TypeVar('Real', float, FloatArray)
-
 BALANCE_TOLERANCE = 1e-6
 """Largest static moment of a balanced link, relative to sqrt(carried mass * inertia) [-]."""
-
-ROUNDING = 1e-15
-"""Coupling of two links that is a rounded zero, relative to their own inertias [-]."""
-
-COULOMB_VELOCITY = 1e-2
-"""Joint velocity at which Coulomb friction has reached tanh(1) of its value [rad/s]."""
 
 
 class InertiaStar(NamedTuple):
@@ -105,14 +93,12 @@ class NaturalMode(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PlanarArm:
+class PlanarArm(ArmDynamics):
     """
     Planar serial arm of n >= 2 links whose last joint is elastic and not actuated.
 
-    It is kept in absolute link angles theta_i = q_1 + ... + q_i, where the dynamics of any planar
-    chain have constant coefficients h and s: kinetic energy 1/2 sum_ij h_ij cos(theta_i - theta_j)
-    theta_i' theta_j' and potential energy gravity * sum_i s_i sin(theta_i). Joint coordinates q
-    follow from theta = S q, S a lower triangle of ones. Arrays of angles may have leading axes.
+    It is kept in absolute link angles, where the dynamics of any planar chain have constant
+    coefficients; efforts and accelerations are those of `ArmDynamics`.
 
     Attributes
     ----------
@@ -148,25 +134,18 @@ class PlanarArm:
             raise InvalidModel(f'inertia must be (n, n) with n >= 2, got shape {inertia.shape}')
         check_definite(inertia)
         inertia = inertia + (inertia.T - inertia) / 2  # the sum of both may overflow
-        inertia.setflags(write=False)
-        fields = {
-            'inertia': inertia,
-            'static_moment': checked_vector('static_moment', self.static_moment, n, 'kg m'),
-            'carried_mass': checked_vector('carried_mass', self.carried_mass, n, 'kg', 0.0),
-            'viscous_friction': checked_vector(
-                'viscous_friction', self.viscous_friction, n - 1, 'N m s/rad', 0.0
-            ),
-            'coulomb_friction': checked_vector(
-                'coulomb_friction', self.coulomb_friction, n - 1, 'N m', 0.0
-            ),
-        }
-        for name, value in fields.items():
+        object.__setattr__(self, 'inertia', locked(inertia))
+        for name, unit, size, lower in (
+            ('static_moment', 'kg m', n, -inf),
+            ('carried_mass', 'kg', n, 0.0),
+            ('viscous_friction', 'N m s/rad', n - 1, 0.0),
+            ('coulomb_friction', 'N m', n - 1, 0.0),
+        ):
+            value = checked_array(name, getattr(self, name), unit, shape=(size,), lower=lower)
             object.__setattr__(self, name, value)
-        checked_vector('damping', [self.damping], 1, 'N m s/rad', 0.0)
-        checked_vector('gravity', [self.gravity], 1, 'm/s^2')
-        checked_vector('stiffness', [self.stiffness], 1, 'N m/rad')
-        if self.stiffness <= 0.0:
-            raise InvalidModel(f'stiffness must be above 0 N m/rad, got {self.stiffness:g}')
+        check_number('damping', self.damping, 'N m s/rad', lower=0.0)
+        check_number('gravity', self.gravity, 'm/s^2')
+        check_number('stiffness', self.stiffness, 'N m/rad', above=0.0)
         check_realizable(self.inertia, self.static_moment, self.carried_mass)
 
     @classmethod
@@ -210,27 +189,23 @@ class PlanarArm:
             If this is no physical arm.
 
         """
-        both, last = checked_vector('inertia_star', inertia_star, 2, 'kg m^2')
-        if not both > last > 0.0:
-            raise InvalidModel(
-                f'inertia_star must satisfy I*_(n-1) > I*_n > 0 kg m^2, got {both:g}, {last:g}'
-            )
+        both, last = checked_inertia_star(inertia_star)
         length, com, mass, own = checked_links(link_length, link_com, link_mass, link_inertia)
-        (tip,) = checked_vector('tip_mass', [tip_mass], 1, 'kg', 0.0)
+        check_number('tip_mass', tip_mass, 'kg', lower=0.0)
         count = length.size
         rider = np.arange(count)[-1:]  # empty for n = 2: the tip is then the base
         chain = chain_load(
             length,
             np.append(np.arange(count), rider),
             np.append(com, length[rider]),
-            np.append(mass, np.full(rider.size, tip)),
+            np.append(mass, np.full(rider.size, tip_mass)),
         )
         inertia = np.diag(np.concatenate((own, [both - last, last])))
         inertia[:count, :count] += chain.inertia
         return cls(
             inertia=inertia,
             static_moment=np.append(chain.static_moment, [0.0, 0.0]),
-            carried_mass=np.append(chain.carried_mass, [tip, tip]),
+            carried_mass=np.append(chain.carried_mass, [tip_mass, tip_mass]),
             stiffness=stiffness,
             damping=damping,
             gravity=gravity,
@@ -282,13 +257,12 @@ class PlanarArm:
         n = length.size
         if n < 2:
             raise InvalidModel(f'an arm must have at least 2 links, got {n}')
+        weights, arms = checked_counterbalances(counterbalance_mass, counterbalance_arm)
         load = chain_load(
             length,
             np.append(np.arange(n), [n - 2, n - 1]),
-            np.append(com, -checked_vector('counterbalance_arm', counterbalance_arm, 2, 'm', 0.0)),
-            np.append(
-                mass, checked_vector('counterbalance_mass', counterbalance_mass, 2, 'kg', 0.0)
-            ),
+            np.append(com, -arms),
+            np.append(mass, weights),
         )
         return cls(
             inertia=load.inertia + np.diag(own),
@@ -313,11 +287,6 @@ class PlanarArm:
             stiffness=stiffness * self.stiffness,
             damping=damping * self.damping,
         )
-
-    @property
-    def n(self) -> int:
-        """Return the number of joints."""
-        return self.static_moment.size
 
     @property
     def inertia_star(self) -> InertiaStar:
@@ -360,102 +329,6 @@ class PlanarArm:
                     f'(mass * arm) by {moment:+.12g} kg m',
                 )
 
-    def mass_matrix(self, q: FloatArray) -> FloatArray:
-        """Return M(q) [kg m^2], shape (..., n, n), at joint angles q [rad], shape (..., n)."""
-        return self._sum.T @ self._link_inertia(_apart(np.cumsum(q, axis=-1))) @ self._sum
-
-    def coriolis(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the Coriolis-centrifugal effort b [N m], shape (..., n), at q, dq [rad/s]."""
-        return self._centrifugal(_apart(np.cumsum(q, axis=-1)), dq) @ self._sum
-
-    def gravity_effort(self, q: FloatArray) -> FloatArray:
-        """Return the effort g(q) that holds the arm against gravity [N m], shape (..., n)."""
-        return self._weight(np.cumsum(q, axis=-1)) @ self._sum
-
-    def friction(self, dq: FloatArray) -> FloatArray:
-        """Return what friction takes from the actuated joints [N m], shape (..., n-1)."""
-        motor = dq[..., :-1]
-        return self.viscous_friction * motor + self.coulomb_friction * np.tanh(
-            motor / COULOMB_VELOCITY
-        )
-
-    def passive_effort(self, q_n: Real, dq_n: Real) -> Real:
-        """Return the effort of spring and damper -k q_n - c dq_n [N m]."""
-        return -self.stiffness * q_n - self.damping * dq_n
-
-    def inverse_dynamics(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """
-        Return the generalised effort that a motion takes.
-
-        Parameters
-        ----------
-        q, dq, ddq
-            Joint angles [rad], velocities [rad/s], accelerations [rad/s^2], shape (..., n).
-
-        Returns
-        -------
-        FloatArray
-            Effort [N m], shape (..., n), friction included; 0 at the passive joint of any motion
-            that motors at the other joints can bring about.
-
-        """
-        effort = self.rigid_effort(q, dq, ddq)
-        effort[..., :-1] += self.friction(dq)
-        effort[..., -1] -= self.passive_effort(q[..., -1], dq[..., -1])
-        return effort
-
-    def rigid_effort(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """Return the effort M ddq + b + g of a motion, without friction and spring, (..., n)."""
-        theta = np.cumsum(q, axis=-1)
-        cos, sin = np.cos(theta), np.sin(theta)
-        along, across = np.cumsum(ddq, axis=-1), np.cumsum(dq, axis=-1) ** 2
-        # cos and sin of differences by the addition theorems: in n angles, not in n^2 differences.
-        torque = cos * ((cos * along - sin * across) @ self.inertia + self._static_load)
-        torque += sin * ((sin * along + cos * across) @ self.inertia)
-        effort: FloatArray = torque @ self._sum
-        return effort
-
-    def forward_dynamics(self, q: FloatArray, dq: FloatArray, effort: FloatArray) -> FloatArray:
-        """
-        Return the joint accelerations under motor efforts.
-
-        Parameters
-        ----------
-        q, dq
-            Joint angles [rad] and velocities [rad/s], shape (..., n).
-        effort
-            Effort of the actuated joints [N m], shape (..., n-1).
-
-        Returns
-        -------
-        FloatArray
-            Accelerations [rad/s^2], shape (..., n).
-
-        """
-        net = np.empty(q.shape)
-        net[..., :-1] = effort
-        net[..., -1] = self.passive_effort(last_of(q), last_of(dq))
-        if self._has_friction:
-            net[..., :-1] -= self.friction(dq)
-        if self._inverse_mass is not None:
-            if self.has_weight:
-                net -= self.gravity_effort(q)
-            return times_matrix(net, self._inverse_mass)
-        theta = q.cumsum(axis=-1)
-        apart = _apart(theta)
-        load = times_matrix(net, self._difference) - self._centrifugal(apart, dq)
-        if self.has_weight:
-            load -= self._weight(theta)
-        return times_matrix(solved(self._link_inertia(apart), load), self._difference.T)
-
-    def energy(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return kinetic, gravitational and elastic energy together [J], shape (...)."""
-        theta, rate = np.cumsum(q, axis=-1), np.cumsum(dq, axis=-1)
-        momentum = applied(self._link_inertia(_apart(theta)), rate)
-        weight = self.gravity * self.static_moment * np.sin(theta)
-        links: FloatArray = np.sum(rate * momentum / 2 + weight, axis=-1)
-        return links - q[..., -1] * self.passive_effort(q[..., -1], np.zeros_like(links)) / 2
-
     def natural_mode(self, *, held: bool = False) -> NaturalMode:
         """
         Return the free oscillation of a flat arm's passive joint.
@@ -475,53 +348,3 @@ class PlanarArm:
         inertia = last if held else last * (both - last) / both  # rotors n-1 and n in series
         frequency = sqrt(self.stiffness / inertia)
         return NaturalMode(frequency, self.damping / (2 * inertia * frequency))
-
-    def _link_inertia(self, apart: FloatArray) -> FloatArray:
-        """Return H(theta), shape (..., n, n)."""
-        return self.inertia * np.cos(apart)
-
-    def _centrifugal(self, apart: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the centrifugal torque on each link, shape (..., n)."""
-        return applied(self.inertia * np.sin(apart), dq.cumsum(axis=-1) ** 2)
-
-    def _weight(self, theta: FloatArray) -> FloatArray:
-        """Return the torque that holds each link against gravity, shape (..., n)."""
-        return self._static_load * np.cos(theta)
-
-    @cached_property
-    def _sum(self) -> FloatArray:
-        """S: absolute link angles are S q, joint efforts are S^T times link torques."""
-        return np.tri(self.n)
-
-    @cached_property
-    def _difference(self) -> FloatArray:
-        """Inverse of S."""
-        return np.eye(self.n) - np.eye(self.n, k=-1)
-
-    @cached_property
-    def _inverse_mass(self) -> FloatArray | None:
-        """Inverse of M where no link is coupled to another, so that M is constant."""
-        own = np.sqrt(np.diag(self.inertia))
-        coupling = np.triu(np.abs(self.inertia), k=1)
-        if (coupling > ROUNDING * np.outer(own, own)).any():
-            return None
-        return self._difference @ np.diag(own**-2) @ self._difference.T
-
-    @cached_property
-    def _static_load(self) -> FloatArray:
-        """Torque that holds each link when it points along x, shape (n,) [N m]."""
-        return self.gravity * self.static_moment
-
-    @cached_property
-    def _has_friction(self) -> bool:
-        return bool(self.viscous_friction.any() or self.coulomb_friction.any())
-
-    @cached_property
-    def has_weight(self) -> bool:
-        """Whether gravity moves the arm, so that it takes efforts to keep it at rest."""
-        return self.gravity != 0.0 and bool(self.static_moment.any())
-
-
-def _apart(theta: FloatArray) -> FloatArray:
-    """Return theta_i - theta_j, shape (..., n, n)."""
-    return theta[..., :, None] - theta[..., None, :]

@@ -15,9 +15,8 @@
 """Rules by which a planner takes over an estimate of its arm's stiffness and damping."""
 
 from dataclasses import dataclass, replace
-from math import isfinite
 
-from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import check_number, FlatPlannerError, InvalidRequest, PlanarArm
 from flat_planner_ros.core.monitor.identification import ActuatedJoints, oscillating_inertia
 
 INERTIA_TOLERANCE = 1e-6
@@ -70,16 +69,12 @@ class ReportedEstimate:
 
     def __post_init__(self) -> None:
         """Refuse numbers without meaning."""
-        if not isfinite(self.start_time):
-            raise InvalidRequest(f'start of the motion must be finite, got {self.start_time} s')
-        for name in ('stiffness', 'inertia'):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0.0):
-                raise InvalidRequest(f'{name} of an estimate must be positive, got {value}')
+        check_number('start_time', self.start_time, 's', error=InvalidRequest)
+        for name, unit in {'stiffness': 'N m/rad', 'inertia': 'kg m^2'}.items():
+            check_number(name, getattr(self, name), unit, above=0.0, error=InvalidRequest)
         for name in ('stiffness_std', 'damping', 'damping_std'):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0.0):
-                raise InvalidRequest(f'{name} of an estimate must be at least 0, got {value}')
+            unit = 'N m/rad' if name == 'stiffness_std' else 'N m s/rad'
+            check_number(name, getattr(self, name), unit, lower=0.0, error=InvalidRequest)
 
     def is_of_motion(self, start: float) -> bool:
         """Return whether the estimate follows the motion with a start [s]."""

@@ -19,7 +19,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, SampledMotion
+from flat_planner_ros.core.arm import (
+    check_number,
+    checked_array,
+    FloatArray,
+    InvalidRequest,
+    SampledMotion,
+)
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,18 +70,17 @@ class PlannedMotion:
         names = tuple(self.joint_names)
         if not names or len(set(names)) != len(names):
             raise InvalidRequest(f'joint names must be unique and at least one, got {names}')
-        if not np.isfinite(self.start):
-            raise InvalidRequest(f'start of a motion must be finite, got {self.start} s')
-        times = _locked('times', self.times, (np.size(self.times),))
+        check_number('start', self.start, 's', error=InvalidRequest)
+        times = self._lock('times', (np.size(self.times),), 's')
         if times.size == 0 or times[0] < 0.0 or not (np.diff(times) > 0.0).all():
             raise InvalidRequest('times of a motion must be ascending from 0 s or later')
         shape = (times.size, len(names))
         object.__setattr__(self, 'joint_names', names)
-        object.__setattr__(self, 'times', times)
-        object.__setattr__(self, 'positions', _locked('positions', self.positions, shape))
-        for name, rows in (('velocities', self.velocities), ('efforts', self.efforts)):
-            if rows is not None:
-                object.__setattr__(self, name, _locked(name, rows, shape))
+        self._lock('positions', shape, 'rad')
+        if self.velocities is not None:
+            self._lock('velocities', shape, 'rad/s')
+        if self.efforts is not None:
+            self._lock('efforts', shape, 'N m')
 
     @property
     def end(self) -> float:
@@ -121,6 +126,13 @@ class PlannedMotion:
 
         """
         return self._motion.at(time - self.start)
+
+    def _lock(self, name: str, shape: tuple[int, ...], unit: str) -> FloatArray:
+        """Put a locked copy in the place of an array; return it."""
+        values = getattr(self, name)
+        array = checked_array(name, values, unit, shape=shape, error=InvalidRequest)
+        object.__setattr__(self, name, array)
+        return array
 
     @cached_property
     def _motion(self) -> SampledMotion:
@@ -207,17 +219,6 @@ def joint_indices(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.int
     if missing:
         raise InvalidRequest(f'no joint {", ".join(missing)} among {", ".join(names) or "none"}')
     return np.array([place[name] for name in wanted], dtype=np.intp)
-
-
-def _locked(name: str, values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """Return a read-only copy of finite values of the wanted shape."""
-    array = np.array(values, dtype=float)
-    if array.shape != shape:
-        raise InvalidRequest(f'{name} of a motion have shape {array.shape}, not {shape}')
-    if not np.isfinite(array).all():
-        raise InvalidRequest(f'{name} of a motion must be finite')
-    array.setflags(write=False)
-    return array
 
 
 def _equal(mine: FloatArray | None, its: FloatArray | None) -> bool:

@@ -16,9 +16,9 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from math import isfinite, sqrt
+from math import sqrt
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import check_number, FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.monitor.identification import (
     ActuatedJoints,
     identify,
@@ -77,18 +77,17 @@ class MonitorSettings:
 
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""
-        for name in ('window', 'amplitude_ok', 'settling_band', 'timeout'):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0.0):
-                raise InvalidRequest(f'{name} must be positive and finite, got {value}')
+        units = {'window': 's', 'amplitude_ok': 'rad', 'settling_band': 'rad', 'timeout': 's'}
+        for name, unit in units.items():
+            check_number(name, getattr(self, name), unit, above=0.0, error=InvalidRequest)
         if not self.amplitude_error >= self.amplitude_ok:
             raise InvalidRequest(
                 f'amplitude_error {self.amplitude_error} rad is below amplitude_ok '
                 f'{self.amplitude_ok} rad'
             )
         frequency, ratio = self.expected_frequency, self.expected_damping_ratio
-        if frequency is not None and not (isfinite(frequency) and frequency > 0.0):
-            raise InvalidRequest(f'expected frequency must be positive, got {frequency} Hz')
+        if frequency is not None:
+            check_number('expected_frequency', frequency, 'Hz', above=0.0, error=InvalidRequest)
         if ratio is not None and not 0.0 <= ratio < 1.0:
             raise InvalidRequest(f'expected damping ratio must be in [0, 1), got {ratio}')
 

@@ -19,13 +19,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, InvalidCommand, SampledMotion
+from flat_planner_ros.core.arm import (
+    check_number,
+    checked_array,
+    FloatArray,
+    InvalidCommand,
+    SampledMotion,
+)
 import numpy as np
 import numpy.typing as npt
 
 MAX_EFFORT = 1e6
 """Largest effort of a command [N m]: no motor of a robot gives more, a broken sender may."""
-
 
 MAX_POSITION = 1e6
 """Largest angle of a command [rad]; as for goals."""
@@ -93,10 +98,8 @@ class EffortProfile:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be played and lock the arrays."""
-        start = float(self.start)
-        if not np.isfinite(start):
-            raise InvalidCommand(f'start must be finite, got {start} s')
-        times = locked('times', self.times, 's')
+        check_number('start', self.start, 's', error=InvalidCommand)
+        times = checked_array('times', self.times, 's', error=InvalidCommand)
         if times.ndim != 1 or times.size < 1:
             raise InvalidCommand(f'times must be (m,) with m >= 1, got shape {times.shape}')
         if times[0] < 0.0:
@@ -106,7 +109,7 @@ class EffortProfile:
             raise InvalidCommand(
                 f'times must increase, got {times[i]:.9g} s then {times[i + 1]:.9g} s'
             )
-        efforts = locked('efforts', self.efforts, 'N m')
+        efforts = checked_array('efforts', self.efforts, 'N m', error=InvalidCommand)
         if efforts.ndim != 2 or efforts.shape[0] != times.size or efforts.shape[1] < 1:
             raise InvalidCommand(
                 f'efforts must be ({times.size}, n-1) with n >= 2, got shape {efforts.shape}'
@@ -116,8 +119,8 @@ class EffortProfile:
             raise InvalidCommand('velocities need positions')
         if (self.anchor_time is None) != (self.anchor_effort is None):
             raise InvalidCommand('anchor_time and anchor_effort go together')
-        for name, value in {'start': start, 'times': times, 'efforts': efforts}.items():
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, 'times', times)
+        object.__setattr__(self, 'efforts', efforts)
         self._lock_optional('positions', self.positions, efforts.shape, 'rad')
         self._lock_optional('velocities', self.velocities, efforts.shape, 'rad/s')
         if self.positions is not None:
@@ -128,7 +131,8 @@ class EffortProfile:
                 raise InvalidCommand(
                     f'the last velocity must be 0 rad/s, got {self.velocities[-1]}'
                 )
-        self._lock_optional('anchor_time', self.anchor_time, (), 's')
+        if self.anchor_time is not None:
+            check_number('anchor_time', self.anchor_time, 's', error=InvalidCommand)
         self._lock_optional('anchor_effort', self.anchor_effort, efforts.shape[1:], 'N m')
 
     @property
@@ -171,12 +175,9 @@ class EffortProfile:
         self, name: str, value: npt.ArrayLike | None, shape: tuple[int, ...], unit: str
     ) -> None:
         """Lock a field that may be missing."""
-        if value is None:
-            return
-        array = locked(name, value, unit)
-        if array.shape != shape:
-            raise InvalidCommand(f'{name} must have shape {shape}, got {array.shape}')
-        object.__setattr__(self, name, array if shape else float(array))
+        if value is not None:
+            array = checked_array(name, value, unit, shape=shape, error=InvalidCommand)
+            object.__setattr__(self, name, array)
 
     @cached_property
     def _before(self) -> FloatArray:
@@ -199,15 +200,6 @@ class EffortProfile:
             times, efforts = np.append(anchor, times), np.vstack((self._before, efforts))
         slopes = np.diff(efforts, axis=0) / np.diff(times)[:, None]
         return _Course(times.tolist(), efforts, np.vstack((slopes, np.zeros(self.motors))))
-
-
-def locked(name: str, value: npt.ArrayLike, unit: str) -> FloatArray:
-    """Return a locked copy of finite numbers."""
-    array = np.array(value, dtype=float, order='C')
-    if not np.isfinite(array).all():
-        raise InvalidCommand(f'{name} must be finite, got a value that is not [{unit}]')
-    array.setflags(write=False)
-    return array
 
 
 def check_bound(name: str, values: FloatArray, bound: float, unit: str) -> None:

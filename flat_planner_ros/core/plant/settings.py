@@ -15,9 +15,9 @@
 """What is simulated, how it is measured, and what it lets itself be told."""
 
 from dataclasses import dataclass, field
-from math import ceil, isfinite
+from math import ceil
 
-from flat_planner_ros.core.arm import InvalidModel, PlanarArm
+from flat_planner_ros.core.arm import check_number, InvalidModel, PlanarArm
 from flat_planner_ros.core.plant.simulation import ArmState, GRID_TOLERANCE
 import numpy as np
 
@@ -48,9 +48,7 @@ class Sensing:
     def __post_init__(self) -> None:
         """Refuse what no sensor does."""
         for name in ('position_std', 'resolution'):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0.0):
-                raise InvalidModel(f'{name} must be finite and at least 0 rad, got {value}')
+            check_number(name, getattr(self, name), 'rad', lower=0.0)
         if 0.0 < self.resolution < FINEST:
             raise InvalidModel(
                 f'resolution must be 0 or at least {FINEST:g} rad, got {self.resolution} rad'
@@ -130,9 +128,7 @@ class SimulationSettings:
     def __post_init__(self) -> None:
         """Refuse times without meaning."""
         for name, unit in {'rate': 'Hz', 'step': 's', 'input_timeout': 's'}.items():
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0.0):
-                raise InvalidModel(f'{name} must be finite and above 0 {unit}, got {value}')
+            check_number(name, getattr(self, name), unit, above=0.0)
         if not self.start_tolerance >= 0.0:
             raise InvalidModel(
                 f'start_tolerance must be at least 0 rad, got {self.start_tolerance}'

@@ -17,13 +17,19 @@
 from math import floor, inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidModel, PlanarArm
+from flat_planner_ros.core.arm import (
+    check_number,
+    checked_array,
+    FloatArray,
+    InvalidCommand,
+    InvalidModel,
+    PlanarArm,
+)
 from flat_planner_ros.core.plant.drives import Drives
 from flat_planner_ros.core.plant.effort_profile import (
     check_bound,
     EffortProfile,
     JointReference,
-    locked,
     MAX_EFFORT,
     MAX_VELOCITY,
 )
@@ -103,10 +109,8 @@ class SimulatedArm:
         feedback_d: npt.ArrayLike | None = None,
     ) -> None:
         """Stand still at the position."""
-        if not (np.isfinite(step) and step > 0.0):
-            raise InvalidModel(f'step must be finite and above 0 s, got {step}')
-        if not np.isfinite(time):
-            raise InvalidModel(f'time must be finite, got {time} s')
+        check_number('step', step, 's', above=0.0)
+        check_number('time', time, 's')
         self._drives = Drives(
             arm, saturation=saturation, feedback_p=feedback_p, feedback_d=feedback_d
         )
@@ -231,9 +235,8 @@ class SimulatedArm:
 
         """
         self._refuse_if_stopped()
-        held = locked('effort', effort, 'N m')
-        if held.shape != (self.arm.n - 1,):
-            raise InvalidCommand(f'effort must have {self.arm.n - 1} entries, got {held.shape}')
+        shape = (self.arm.n - 1,)
+        held = checked_array('effort', effort, 'N m', shape=shape, error=InvalidCommand)
         check_bound('effort', held, MAX_EFFORT, 'N m')
         self._profile, self._braked_until = None, -inf
         self._held, self._held_until = self._drives.idle._replace(effort=held), until
@@ -255,10 +258,8 @@ class SimulatedArm:
 
     def reset(self, position: npt.ArrayLike) -> None:
         """Rest at joint angles (n,) [rad] without a command; time goes on."""
-        angles = np.array(position, dtype=float)
-        if angles.shape != (self.arm.n,) or not np.isfinite(angles).all():
-            raise InvalidModel(f'position must be {self.arm.n} finite rad, got {angles}')
-        self._position, self._velocity = angles, np.zeros(self.arm.n)
+        self._position = checked_array('position', position, 'rad', shape=(self.arm.n,))
+        self._velocity = np.zeros(self.arm.n)
         self._fault = ''
         self.release()
 

@@ -16,8 +16,9 @@
 
 from dataclasses import FrozenInstanceError
 
+from flat_planner_ros.core.arm.dynamics import COULOMB_VELOCITY
 from flat_planner_ros.core.arm.errors import InvalidModel, NotFlat
-from flat_planner_ros.core.arm.planar_arm import BALANCE_TOLERANCE, COULOMB_VELOCITY, PlanarArm
+from flat_planner_ros.core.arm.planar_arm import BALANCE_TOLERANCE, PlanarArm
 import numpy as np
 import pytest
 
