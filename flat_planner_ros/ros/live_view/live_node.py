@@ -43,7 +43,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 LIVE_VIEW = 'flat_live_view'
 """Name of the node."""
 
-MEASURED, REFERENCE, RESIDUAL = STREAMS = ('measured', 'reference', 'residual')
+MEASURED, REFERENCE, RESIDUAL = 'measured', 'reference', 'residual'
+STREAMS = (MEASURED, REFERENCE, RESIDUAL)
 """Names of the streams; a row is the time, positions, velocities and efforts."""
 
 ROW_PERIOD = 0.01

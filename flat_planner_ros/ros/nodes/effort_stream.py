@@ -44,7 +44,8 @@ class EffortStream:
     """
 
     def __init__(self, node: Node, publisher: Publisher, session: PlannerSession) -> None:
-        self._node, self._session = node, session
+        self._node = node
+        self._session = session
         self._publisher = publisher
         self._timer: Timer | None = None
         self._period = 0.0

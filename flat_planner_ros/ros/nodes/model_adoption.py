@@ -51,7 +51,9 @@ class ModelAdoption:
         announce: Callable[[DiagnosticStatus], None],
     ) -> None:
         self._node = node
-        self._settings, self._last_start, self._announce = settings, last_start, announce
+        self._settings = settings
+        self._last_start = last_start
+        self._announce = announce
         self._tuner = ModelTuner()
         report = interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
         node.create_subscription(DiagnosticArray, report, self._on_report, interfaces.LATCHED)

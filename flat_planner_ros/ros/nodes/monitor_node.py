@@ -176,10 +176,11 @@ class MonitorNode(Node):
 
     def _on_diagnostics(self) -> None:
         """Publish the present state, and say what was wrong since the last time."""
-        for trouble in self._monitor.take_warnings():
-            self.get_logger().warning(trouble)
-        phase, dropped = self._monitor.phase.value, self._monitor.dropped
-        status = diagnostics.monitor_status(self._report, phase, dropped)
+        for warning in self._monitor.take_warnings():
+            self.get_logger().warning(warning)
+        status = diagnostics.monitor_status(
+            self._report, self._monitor.phase.value, self._monitor.dropped
+        )
         self._health.publish(diagnostics.array_of(status, self._now()))
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -154,8 +154,8 @@ class PlantNode(Node):
 
     def _on_watch(self) -> None:
         """Say what went wrong, with numbers, at most once per period."""
-        for trouble in self._arm.take_warnings():
-            self.get_logger().warning(trouble)
+        for warning in self._arm.take_warnings():
+            self.get_logger().warning(warning)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -73,6 +73,7 @@ LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
 
 ROWS = [
     *MODEL_ROWS,
+    # The node's own choice: the core's default is the plainest law.
     Row(
         'strategy',
         Strategy.MIN_CONTROL_EFFORT,
@@ -127,7 +128,7 @@ ROWS = [
         'rad',
         'lower position limits per joint',
         '.inf = none',
-        infinite=True,
+        may_be_infinite=True,
     ),
     Row(
         'limits.position_max',
@@ -135,7 +136,7 @@ ROWS = [
         'rad',
         'upper position limits per joint',
         '.inf = none',
-        infinite=True,
+        may_be_infinite=True,
     ),
     Row(
         'limits.velocity',
@@ -143,9 +144,16 @@ ROWS = [
         'rad/s',
         'velocity limits per joint',
         '.inf = none',
-        infinite=True,
+        may_be_infinite=True,
     ),
-    Row('limits.effort', DOUBLES, 'N m', 'effort limits per joint', '.inf = none', infinite=True),
+    Row(
+        'limits.effort',
+        DOUBLES,
+        'N m',
+        'effort limits per joint',
+        '.inf = none',
+        may_be_infinite=True,
+    ),
     Row(
         'limits.on_violation',
         SessionSettings.on_violation,

@@ -119,7 +119,7 @@ ROWS = [
         'rad',
         'largest distance of a command from where the arm is',
         lower=0.0,
-        infinite=True,
+        may_be_infinite=True,
     ),
     Row(
         'mismatch.stiffness_scale',
@@ -161,7 +161,7 @@ ROWS = [
         'largest effort per actuated joint',
         'none by default',
         lower=0.0,
-        infinite=True,
+        may_be_infinite=True,
         read_only=True,
     ),
     Row(

@@ -82,7 +82,7 @@ class Row:
         Meaning of a special value, or where the parameter counts.
     lower, upper
         Range of every number in it.
-    infinite
+    may_be_infinite
         Whether infinity is allowed, meaning no limit.
     read_only
         Whether it is structural, fixed at the start; all others may change at run time.
@@ -97,7 +97,7 @@ class Row:
     _: KW_ONLY
     lower: float = -inf
     upper: float = inf
-    infinite: bool = False
+    may_be_infinite: bool = False
     read_only: bool = False
 
     @property
@@ -139,7 +139,7 @@ class Row:
     def _allowed(self) -> str:
         """Return the constraints, or what any value of the type is, and whether it may change."""
         allowed = self.constraints or ANY_VALUE[self.type]
-        if self.infinite and not self.constraints:
+        if self.may_be_infinite and not self.constraints:
             allowed = 'numbers, or .inf'
         if isinstance(self.given, Parameter.Type):
             allowed += '; may be left out'
@@ -178,7 +178,7 @@ class Row:
         for number in numbers:
             if not isinstance(number, float):
                 continue
-            is_number = isfinite(number) or (self.infinite and not isnan(number))
+            is_number = isfinite(number) or (self.may_be_infinite and not isnan(number))
             if not (is_number and self.lower <= number <= self.upper):
                 raise InvalidParameter(
                     f'{self.name} must be {self.constraints or "finite"}, got {number}'

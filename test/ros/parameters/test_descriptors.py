@@ -19,23 +19,15 @@ import re
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
-from flat_planner_ros.ros.parameters import (
-    monitor as monitor_parameters,
-)
-from flat_planner_ros.ros.parameters import (
-    planner as planner_parameters,
-)
-from flat_planner_ros.ros.parameters import (
-    plant as plant_parameters,
-)
+from flat_planner_ros.ros.parameters import monitor, planner, plant
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters
 
 NODES = {
-    'flat_planner': (PlannerNode, planner_parameters),
-    'flat_plant': (PlantNode, plant_parameters),
-    'flat_monitor': (MonitorNode, monitor_parameters),
+    'flat_planner': (PlannerNode, planner),
+    'flat_plant': (PlantNode, plant),
+    'flat_monitor': (MonitorNode, monitor),
 }
 WITHOUT_UNIT = {
     'weights.r': 'its unit is what makes r^8 tau^2 one of the jerk-like term',
