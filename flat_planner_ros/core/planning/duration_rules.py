@@ -18,11 +18,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import FloatArray, PlanarArm
 from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
-from flat_planner_ros.core.planning.request import Reason, RequestRejected
+from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.request import (
+    MotionRequest,
+    PlanningOptions,
+    Reason,
+    RequestRejected,
+)
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
 
 REASONS = {
@@ -93,15 +99,19 @@ class DurationRules:
         )
 
     def plan_within(
-        self, plan_of: Callable[[float], Plan], duration: float | None
+        self,
+        request: MotionRequest,
+        arm: PlanarArm,
+        options: PlanningOptions,
+        duration: float | None,
     ) -> tuple[Plan, LimitUse | None]:
         """
         Return the plan of a motion within the limits, and what stretched it.
 
         Parameters
         ----------
-        plan_of
-            Plan of a duration [s].
+        request, arm, options
+            The motion in any duration, as for `plan`.
         duration
             Prescribed [s]; None for the shortest that obeys the limits.
 
@@ -119,6 +129,10 @@ class DurationRules:
             There is no plan of the prescribed duration, or of any.
 
         """
+
+        def plan_of(time: float) -> Plan:
+            return plan(request.stretched(time), arm, options)
+
         if duration is None:
             return self._shortest(plan_of, self.shortest), None
         prescribed = plan_of(duration)

@@ -47,37 +47,59 @@ class MotionStart(NamedTuple):
     running: Motion | None = None
 
 
-def pose_at_rest(
+def motion_start(
     settings: SessionSettings,
+    timeline: Timeline,
     measured: JointSample | None,
-    reference: FloatArray | None,
+    last: FloatArray | None,
+    stamp: float | None,
     now: float,
-) -> FloatArray:
+) -> MotionStart:
     """
-    Return where a motion from rest starts, checked against what is measured.
+    Return where a motion starts: at rest, or spliced to what is planned.
 
     Parameters
     ----------
     settings
-        Source of the start, and its tolerances.
+        Source of a start at rest, tolerances, delays.
+    timeline
+        Motions that are planned.
     measured
         Last measured state, None before the first.
-    reference
+    last
         Angles at the end of the last motion, shape (n,) [rad]; None if there has been none.
+    stamp
+        Absolute time at which it is to start [s]; None for as soon as possible.
     now
         Present time [s].
-
-    Returns
-    -------
-    FloatArray
-        Angles of all joints, the passive one relaxed, shape (n,) [rad].
 
     Raises
     ------
     RequestRejected
-        The start is not known, or the arm does not rest there.
+        The stamp is past, the start not known, the arm does not rest there, or it moves and
+        cannot be taken over then.
 
     """
+    check_stamp(stamp, now)
+    if not timeline.is_busy(now):
+        time = now + settings.start_delay if stamp is None else stamp
+        return MotionStart(time, _pose_at_rest(settings, measured, last, now))
+    if not settings.is_stamped:
+        raise RequestRejected(
+            Reason.BUSY,
+            'another motion is under way; none can take over from it as commands have no '
+            'stamp (command.stamp)',
+        )
+    return _splice(timeline, stamp, now + settings.lookahead)
+
+
+def _pose_at_rest(
+    settings: SessionSettings,
+    measured: JointSample | None,
+    last: FloatArray | None,
+    now: float,
+) -> FloatArray:
+    """Return the pose from which a motion starts at rest, checked against what is measured."""
     timeout = settings.joint_state_timeout
     if settings.start_source in (StartSource.AUTO, StartSource.MEASURED):
         measured = _fresh(measured, timeout, now)
@@ -85,8 +107,8 @@ def pose_at_rest(
     else:
         if settings.start_source is StartSource.PARAMETER:
             pose = np.array(settings.start_position)
-        elif reference is not None:
-            pose = reference
+        elif last is not None:
+            pose = last
         else:
             raise RequestRejected(
                 Reason.START_STATE_UNKNOWN,
@@ -99,24 +121,11 @@ def pose_at_rest(
     return pose
 
 
-def splice(timeline: Timeline, stamp: float | None, soonest: float) -> MotionStart:
+def _splice(timeline: Timeline, stamp: float | None, soonest: float) -> MotionStart:
     """
-    Return the start of a motion that takes over from what is planned.
+    Return the start of a motion in the midst of what is planned, which must be busy.
 
-    Parameters
-    ----------
-    timeline
-        Busy: a motion is under way or waits for its start.
-    stamp
-        Absolute time at which it is to start [s]; None for as soon as possible.
-    soonest
-        Earliest time at which it can take over from a moving arm [s].
-
-    Raises
-    ------
-    RequestRejected
-        The arm moves then, and it is too soon.
-
+    Before `soonest` the moving arm cannot be taken over.
     """
     time = timeline.splice_time(soonest) if stamp is None else stamp
     running = timeline.at(time)

@@ -24,7 +24,6 @@ from flat_planner_ros.core.planning import (
     LimitUse,
     MotionRequest,
     Plan,
-    plan,
     planned_at_rest,
     PlanSamples,
     Reason,
@@ -37,9 +36,8 @@ from flat_planner_ros.core.session.goal import checked_goal, Goal
 from flat_planner_ros.core.session.motion_start import (
     check_carried_out,
     check_stamp,
+    motion_start,
     MotionStart,
-    pose_at_rest,
-    splice,
 )
 from flat_planner_ros.core.session.settings import SessionSettings
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
@@ -266,19 +264,8 @@ class PlannerSession:
 
     def _start(self, stamp: float | None, now: float) -> MotionStart:
         """Return where a motion starts."""
-        settings = self.settings
-        check_stamp(stamp, now)
-        if not self._timeline.is_busy(now):
-            time = now + settings.start_delay if stamp is None else stamp
-            reference = None if self._motion is None else self._motion.plan.request.final
-            return MotionStart(time, pose_at_rest(settings, self._measured, reference, now))
-        if not settings.is_stamped:
-            raise RequestRejected(
-                Reason.BUSY,
-                'another motion is under way; none can take over from it as commands have no '
-                'stamp (command.stamp)',
-            )
-        return splice(self._timeline, stamp, now + settings.lookahead)
+        last = None if self._motion is None else self._motion.plan.request.final
+        return motion_start(self.settings, self._timeline, self._measured, last, stamp, now)
 
 
 def _check_time(now: float) -> None:
@@ -306,20 +293,17 @@ def _plan_of_goal(
         rules.check_pose(f'via point {index}', positions)
     rules.check_pose('the final', final)
 
-    def within_limits(request: MotionRequest) -> tuple[Plan, LimitUse | None]:
-        return rules.plan_within(
-            lambda time: plan(request.stretched(time), arm, options), duration
-        )
-
     try:
         request = _request(goal, start, duration or NOMINAL_DURATION)
         if not via or goal.duration is not None:
-            return within_limits(request)
-        found, exceeded = within_limits(with_via_times(request, arm, options))
+            return rules.plan_within(request, arm, options, duration)
+        request = with_via_times(request, arm, options)
+        found, exceeded = rules.plan_within(request, arm, options, duration)
         if duration is not None:
             return found, exceeded
         # The best shares of the time depend on the time, if little.
-        return within_limits(with_via_times(found.request, arm, options))
+        request = with_via_times(found.request, arm, options)
+        return rules.plan_within(request, arm, options, duration)
     except InvalidRequest as error:
         raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
     except OutOfReach as error:
