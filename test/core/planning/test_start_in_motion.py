@@ -115,7 +115,7 @@ def test_the_rest_of_an_optimal_motion_is_optimal(arm, name, share):
     times = np.linspace(0.0, 1.0 - share, 60)
     expected, found = whole.trajectory.jets(share + times), rest.trajectory.jets(times)
     scale = np.abs(whole.trajectory.jets(np.linspace(0, 1, 300))).max(axis=2, keepdims=True)
-    # The seam's derivatives are rounded, and the fifth of them is felt most at the sixth.
+    # The splice's derivatives are rounded, and the fifth of them is felt most at the sixth.
     assert (np.abs(found - expected)[:, :6] <= 1e-9 * scale[:, :6]).all()
     assert rest.at(times).efforts == pytest.approx(
         whole.at(share + times).efforts, abs=1e-9 * whole.peak_effort.max()

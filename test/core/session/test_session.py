@@ -303,11 +303,11 @@ def test_what_is_being_played_stays_as_it_is():
     track = planner.track(now)
     origin = round((track.start - first.start) / SETTINGS.period)
     assert now - SETTINGS.period < track.start <= now
-    seam = round((second.start - track.start) / SETTINGS.period)
+    splice = round((second.start - track.start) / SETTINGS.period)
     for quantity in ('positions', 'velocities', 'accelerations', 'efforts'):
         sent = getattr(track, quantity)
-        assert (sent[:seam] == getattr(first.samples, quantity)[origin : origin + seam]).all()
-        assert (sent[seam:] == getattr(second.samples, quantity)).all()
+        assert (sent[:splice] == getattr(first.samples, quantity)[origin : origin + splice]).all()
+        assert (sent[splice:] == getattr(second.samples, quantity)).all()
     assert track.times[0] == 0.0
     assert np.diff(track.times) == pytest.approx(SETTINGS.period, abs=1e-6)
     assert track.flat.shape == (1, 6, len(track.times))

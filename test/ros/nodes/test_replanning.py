@@ -76,16 +76,16 @@ def test_the_command_goes_on_as_it_was_until_the_new_motion_takes_over(graph):
     second = arm.send(0.0)
     graph.expect(lambda: len(arm.commands) == 2, 'both commands')
     old, new = arm.commands
-    seam = float(second['start_time'])
+    splice = float(second['start_time'])
     played = {time: point.effort[0] for time, point in points(old)}
-    kept = [(time, point.effort[0]) for time, point in points(new) if time < seam - 1e-6]
+    kept = [(time, point.effort[0]) for time, point in points(new) if time < splice - 1e-6]
     assert len(kept) >= int(LOOKAHEAD / 0.005)
     for time, effort in kept:
         nearest = min(played, key=lambda other, time=time: abs(other - time))
         assert abs(nearest - time) < 1e-6
         assert played[nearest] == effort
-    after = next(point.effort[0] for time, point in points(new) if time >= seam - 1e-6)
-    nearest = min(played, key=lambda other: abs(other - seam))
+    after = next(point.effort[0] for time, point in points(new) if time >= splice - 1e-6)
+    nearest = min(played, key=lambda other: abs(other - splice))
     assert after == pytest.approx(played[nearest], abs=1e-7)
 
 
