@@ -17,6 +17,7 @@
 from collections.abc import Callable
 from functools import cache
 from math import inf, isfinite
+from typing import Any, TypeVar
 
 from flat_planner_ros.core.arm.errors import FlatPlannerError, InvalidModel
 import numpy as np
@@ -28,8 +29,10 @@ FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 """The same for complex values."""
 
+AnyArray = TypeVar('AnyArray', bound=npt.NDArray[Any])
 
-def locked(array: FloatArray) -> FloatArray:
+
+def locked(array: AnyArray) -> AnyArray:
     """Return the very same array, which nobody can write to any more."""
     array.setflags(write=False)
     return array

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, sqrt
 
-from flat_planner_ros.core.arm import apply_row, Drive, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import apply_row, Drive, FloatArray, locked, PlanarArm
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
 from flat_planner_ros.core.motion_law import JET_ORDER, ScaledLaw
 import numpy as np
@@ -227,8 +227,7 @@ def integration(size: int) -> FloatArray:
             matrix[k + 1, k] = 1.0 / (2 * k + 1)
         if k > 0:
             matrix[k - 1, k] = -1.0 / (2 * k + 1)
-    matrix.setflags(write=False)
-    return matrix
+    return locked(matrix)
 
 
 @lru_cache(maxsize=BASES_KEPT)
@@ -238,8 +237,7 @@ def differentiation(size: int) -> FloatArray:
     below, order = np.indices((size, size))
     is_part = (order > below) & ((order - below) % 2 == 1)
     matrix = np.where(is_part, 2.0 * below + 1.0, 0.0)
-    matrix.setflags(write=False)
-    return matrix
+    return locked(matrix)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -310,7 +308,7 @@ def response(
     for k in range(JET_ORDER, 0, -1):
         table[k - 1] = once @ table[k]
     table[0, 0] -= 0.5
-    table.setflags(write=False)
+    locked(table)
     return SeriesLaw(duration=duration, table=table)
 
 
@@ -343,7 +341,7 @@ def _split(second: FloatArray, delta: float, epsilon: float, duration: float) ->
         sigma[k] = slope @ sigma[k - 1]
     operator = np.eye(size) + delta * slope + epsilon * slope @ slope
     table = np.asarray(np.linalg.solve(operator, sigma.T).T, dtype=float)
-    table.setflags(write=False)
+    locked(table)
     rate = (-delta + 1j * np.sqrt(4.0 * epsilon - delta**2)) / (2.0 * epsilon)
     # The fourth derivative of w starts at rest: there the particular solution is smallest.
     signs = (-1.0) ** np.arange(size)

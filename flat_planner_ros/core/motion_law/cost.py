@@ -25,7 +25,7 @@ from enum import Enum
 from functools import cache
 from typing import Self
 
-from flat_planner_ros.core.arm import FlatMap, FloatArray, InvalidCost
+from flat_planner_ros.core.arm import FlatMap, FloatArray, InvalidCost, locked
 import numpy as np
 
 ORDER = 6
@@ -72,7 +72,7 @@ class QuadraticCost:
         """Refuse what has no unique minimum."""
         matrix = np.array(self.matrix, dtype=float)
         object.__setattr__(self, 'matrix', matrix)
-        matrix.setflags(write=False)
+        locked(matrix)
         if is_sum_of_squares:
             return
         if matrix.shape != (ORDER, ORDER):

@@ -28,7 +28,7 @@ from itertools import pairwise
 from math import ceil, log2
 from typing import Protocol, Self
 
-from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.terms import Term, term_sum, TermSum, TOP_ORDER
 import numpy as np
 from numpy.typing import ArrayLike
@@ -185,7 +185,7 @@ class PiecewiseLaw:
 
     def __post_init__(self) -> None:
         """Lock the edges."""
-        self.edges.setflags(write=False)
+        locked(self.edges)
 
     @property
     def duration(self) -> float:

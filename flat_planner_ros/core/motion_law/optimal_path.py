@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import cache
 from math import ceil, log2
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, strict_arithmetic
+from flat_planner_ros.core.arm import checked_array, FloatArray, InvalidRequest, strict_arithmetic
 from flat_planner_ros.core.motion_law.basis import (
     CONDITIONS,
     segment_basis,
@@ -71,10 +71,8 @@ class PathConditions:
     def __post_init__(self) -> None:
         """Refuse what no path could go through."""
         for name in ('edges', 'start', 'values', 'relaxations'):
-            array = np.array(getattr(self, name), dtype=float)
-            if not np.isfinite(array).all():
-                raise InvalidRequest(f'the {name} of a path must be finite, got {array}')
-            array.setflags(write=False)
+            unit = 's' if name in ('edges', 'relaxations') else 'rad'
+            array = checked_array(name, getattr(self, name), unit, error=InvalidRequest)
             object.__setattr__(self, name, array)
         variables, segments = self.values.shape
         shapes = self.edges.shape, self.start.shape, self.relaxations.shape

@@ -26,7 +26,7 @@ from collections.abc import Iterable, Sequence
 from functools import cache, cached_property
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.terms import Number
 import numpy as np
 from numpy.typing import NDArray
@@ -223,8 +223,7 @@ def _monomial(degree: int) -> ComplexArray:
     """Return D^degree, descending."""
     factor = np.zeros(degree + 1, dtype=complex)
     factor[0] = 1.0
-    factor.setflags(write=False)
-    return factor
+    return locked(factor)
 
 
 class _Group(NamedTuple):

@@ -19,7 +19,14 @@ from functools import cached_property
 from math import ceil
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import apply_row, FlatMap, FloatArray, PlanarArm, UncertifiedPlan
+from flat_planner_ros.core.arm import (
+    apply_row,
+    FlatMap,
+    FloatArray,
+    locked,
+    PlanarArm,
+    UncertifiedPlan,
+)
 from flat_planner_ros.core.planning.reference_trajectory import (
     even_times,
     MotionProblem,
@@ -74,9 +81,9 @@ class PlanSamples:
 
     def __post_init__(self) -> None:
         """Lock the tables."""
-        self.times.setflags(write=False)
-        self.planned.setflags(write=False)
-        self.driving_effort.setflags(write=False)
+        locked(self.times)
+        locked(self.planned)
+        locked(self.driving_effort)
 
     @property
     def positions(self) -> FloatArray:
@@ -108,8 +115,7 @@ class PlanSamples:
             efforts[:, : n - 2] = self.arm.rigid_effort(*self._joints)[:, : n - 2]
         if self.compensates_friction:
             efforts[:, :-1] += self.arm.friction(self.velocities)
-        efforts.setflags(write=False)
-        return efforts
+        return locked(efforts)
 
     @cached_property
     def flat(self) -> FloatArray:
@@ -117,8 +123,7 @@ class PlanSamples:
         flat = _derivatives(self.flat_map.output, self.planned[0], FLAT_ORDERS)[None]
         if len(self.planned) > 1:
             flat = np.concatenate([flat, self.planned[1:, :FLAT_ORDERS]])
-        flat.setflags(write=False)
-        return flat
+        return locked(flat)
 
     @cached_property
     def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -132,7 +137,7 @@ class PlanSamples:
             joints[:, :, i] = self.planned[1 + i, :JOINT_ORDERS]
             inner -= joints[:, :, i]
         joints[:, :, n - 1] = passive
-        joints.setflags(write=False)
+        locked(joints)
         positions, velocities, accelerations = joints
         return positions, velocities, accelerations
 

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, locked
 from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 import numpy as np
@@ -99,8 +99,7 @@ class JointLimits:
             values = np.array(getattr(self, name), dtype=float)
             if values.ndim != 1 or np.isnan(values).any():
                 raise InvalidRequest(f'limits.{name} must be a vector of numbers, got {values}')
-            values.setflags(write=False)
-            object.__setattr__(self, name, values)
+            object.__setattr__(self, name, locked(values))
         sizes = {name: len(getattr(self, name)) for name in FIELDS}
         if len(set(sizes.values())) != 1:
             raise InvalidRequest(f'limits must be of the same joints, got {sizes}')

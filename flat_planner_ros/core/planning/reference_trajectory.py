@@ -29,6 +29,7 @@ from flat_planner_ros.core.arm import (
     flat_map,
     FlatMap,
     FloatArray,
+    locked,
     PlanarArm,
     strict_arithmetic,
 )
@@ -166,8 +167,7 @@ def _grid(problem: MotionProblem, intervals: int) -> FloatArray:
     """Return the motion over 1 rad at even times."""
     table = np.empty((len(problem.rates) + 1, intervals + 1))
     _fill(problem, table, 1.0)
-    table.setflags(write=False)
-    return table
+    return locked(table)
 
 
 def _fill(problem: MotionProblem, table: FloatArray, distance: float) -> None:
@@ -185,8 +185,7 @@ def even_times(duration: float, intervals: int) -> FloatArray:
     times = np.arange(intervals + 1.0)
     times /= intervals
     times *= duration
-    times.setflags(write=False)
-    return times
+    return locked(times)
 
 
 class ReferenceTrajectory(Protocol):

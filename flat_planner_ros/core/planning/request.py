@@ -18,7 +18,14 @@ from dataclasses import dataclass, field, KW_ONLY, replace
 from enum import Enum
 from math import isfinite
 
-from flat_planner_ros.core.arm import FlatModel, FlatPlannerError, FloatArray, InvalidRequest
+from flat_planner_ros.core.arm import (
+    checked_array,
+    FlatModel,
+    FlatPlannerError,
+    FloatArray,
+    InvalidRequest,
+    locked,
+)
 from flat_planner_ros.core.insensitive import Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 import numpy as np
@@ -118,11 +125,10 @@ class MotionRequest:
 
     def _check_start_jets(self) -> None:
         """Refuse jets that are not finite, or those of another arm, and lock a copy."""
-        jets = np.array(self.start_jets, dtype=float)
         shape = (len(self.final) - 1, CONDITIONS)
-        if jets.shape != shape or not np.isfinite(jets).all():
-            raise InvalidRequest(f'start_jets must be finite of shape {shape}, got {jets}')
-        jets.setflags(write=False)
+        jets = checked_array(
+            'start_jets', np.array(self.start_jets), 'rad/s^k', shape=shape, error=InvalidRequest
+        )
         object.__setattr__(self, 'start_jets', jets)
 
 
@@ -161,8 +167,7 @@ class PlanningOptions:
         """Lock a copy of the matrix."""
         if self.custom is not None:
             custom = np.array(self.custom, dtype=float)
-            custom.setflags(write=False)
-            object.__setattr__(self, 'custom', custom)
+            object.__setattr__(self, 'custom', locked(custom))
 
 
 class Reason(Enum):
@@ -249,8 +254,6 @@ def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:
 
 def _angles(name: str, values: FloatArray) -> FloatArray:
     """Return a locked copy of a finite vector."""
-    angles = np.array(values, dtype=float)
-    if angles.ndim != 1 or not np.isfinite(angles).all():
-        raise InvalidRequest(f'{name} angles must be a finite vector, got {angles}')
-    angles.setflags(write=False)
-    return angles
+    return checked_array(
+        f'{name} angles', values, 'rad', shape=(np.size(values),), error=InvalidRequest
+    )

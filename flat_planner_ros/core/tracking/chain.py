@@ -23,7 +23,7 @@ integrator. Both are a chain: the input is a fixed combination of one flat outpu
 from dataclasses import dataclass
 from functools import cached_property
 
-from flat_planner_ros.core.arm import flat_map, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import flat_map, FloatArray, locked, PlanarArm
 import numpy as np
 
 
@@ -49,7 +49,7 @@ class Chain:
     def __post_init__(self) -> None:
         """Lock the rows."""
         for row in (self.input_row, self.angle_rows):
-            row.setflags(write=False)
+            locked(row)
 
     @property
     def order(self) -> int:
