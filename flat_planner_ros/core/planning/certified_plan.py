@@ -19,14 +19,7 @@ from functools import cached_property
 from math import ceil
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import (
-    apply_row,
-    FlatMap,
-    FloatArray,
-    locked,
-    PlanarArm,
-    UncertifiedPlan,
-)
+from flat_planner_ros.core.arm import apply_row, FloatArray, locked, UncertifiedPlan
 from flat_planner_ros.core.planning.reference_trajectory import (
     even_times,
     MotionProblem,
@@ -65,8 +58,8 @@ class PlanSamples:
         Derivatives 0 to 6 of the planned variables w, shape (n - 1, 7, m) [rad/s^k].
     driving_effort
         Effort of joint n-1, which drives the passive one, without friction, shape (m,) [N m].
-    arm, flat_map
-        Model by which joint motion and efforts follow from the planned variables.
+    problem
+        Arm and flat map by which joint motion and efforts follow from the planned variables.
     compensates_friction
         Whether the efforts include what friction takes.
 
@@ -75,8 +68,7 @@ class PlanSamples:
     times: FloatArray
     planned: FloatArray
     driving_effort: FloatArray
-    arm: PlanarArm
-    flat_map: FlatMap
+    problem: MotionProblem
     compensates_friction: bool = False
 
     def __post_init__(self) -> None:
@@ -108,19 +100,19 @@ class PlanSamples:
         Joint n-1 follows from the flat map ((13) of docs/derivation.md), those before it from the
         inverse dynamics of the arm.
         """
-        n = self.arm.n
+        n = self.problem.arm.n
         efforts = np.zeros((len(self.times), n))
         efforts[:, n - 2] = self.driving_effort
         if n > 2:
-            efforts[:, : n - 2] = self.arm.rigid_effort(*self._joints)[:, : n - 2]
+            efforts[:, : n - 2] = self.problem.arm.rigid_effort(*self._joints)[:, : n - 2]
         if self.compensates_friction:
-            efforts[:, :-1] += self.arm.friction(self.velocities)
+            efforts[:, :-1] += self.problem.arm.friction(self.velocities)
         return locked(efforts)
 
     @cached_property
     def flat(self) -> FloatArray:
         """Return derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k]."""
-        flat = _derivatives(self.flat_map.output, self.planned[0], FLAT_ORDERS)[None]
+        flat = _derivatives(self.problem.flat_map.output, self.planned[0], FLAT_ORDERS)[None]
         if len(self.planned) > 1:
             flat = np.concatenate([flat, self.planned[1:, :FLAT_ORDERS]])
         return locked(flat)
@@ -128,8 +120,8 @@ class PlanSamples:
     @cached_property
     def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return positions, velocities and accelerations."""
-        n = self.arm.n
-        passive = _derivatives(self.flat_map.deflection, self.planned[0], JOINT_ORDERS)
+        n = self.problem.arm.n
+        passive = _derivatives(self.problem.flat_map.deflection, self.planned[0], JOINT_ORDERS)
         joints = np.empty((JOINT_ORDERS, len(self.times), n))
         # y1 is the angle of the last link, the sum of all joints'.
         inner = np.subtract(self.flat[0, :JOINT_ORDERS], passive, out=joints[:, :, n - 2])
@@ -203,8 +195,13 @@ class Plan:
 
         """
         intervals = max(1, ceil(self.duration / period - SPACING_TOLERANCE))
-        return self._samples(
-            even_times(self.duration, intervals), *self.trajectory.on_even_grid(intervals)
+        planned, driving_effort = self.trajectory.on_even_grid(intervals)
+        return PlanSamples(
+            times=even_times(self.duration, intervals),
+            planned=planned,
+            driving_effort=driving_effort,
+            problem=self.problem,
+            compensates_friction=self.options.compensate_friction,
         )
 
     def at(self, times: FloatArray) -> PlanSamples:
@@ -218,8 +215,13 @@ class Plan:
 
         """
         planned = self.trajectory.jets(times)
-        driving_effort = apply_row(self.problem.flat_map.effort, planned[0])
-        return self._samples(np.array(times), planned, driving_effort)
+        return PlanSamples(
+            times=np.array(times),
+            planned=planned,
+            driving_effort=apply_row(self.problem.flat_map.effort, planned[0]),
+            problem=self.problem,
+            compensates_friction=self.options.compensate_friction,
+        )
 
     @property
     def rms_effort(self) -> FloatArray:
@@ -264,19 +266,6 @@ class Plan:
             np.sqrt(weights @ samples.efforts**2),
             np.abs(samples.efforts).max(axis=0),
             np.abs(samples.velocities).max(axis=0),
-        )
-
-    def _samples(
-        self, times: FloatArray, planned: FloatArray, driving_effort: FloatArray
-    ) -> PlanSamples:
-        """Return samples of this plan."""
-        return PlanSamples(
-            times=times,
-            planned=planned,
-            driving_effort=driving_effort,
-            arm=self.problem.arm,
-            flat_map=self.problem.flat_map,
-            compensates_friction=self.options.compensate_friction,
         )
 
 

@@ -103,7 +103,8 @@ class DurationRules:
         request: MotionRequest,
         arm: PlanarArm,
         options: PlanningOptions,
-        duration: float | None,
+        *,
+        is_prescribed: bool,
     ) -> tuple[Plan, LimitUse | None]:
         """
         Return the plan of a motion within the limits, and what stretched it.
@@ -111,9 +112,10 @@ class DurationRules:
         Parameters
         ----------
         request, arm, options
-            The motion in any duration, as for `plan`.
-        duration
-            Prescribed [s]; None for the shortest that obeys the limits.
+            The motion, as for `plan`.
+        is_prescribed
+            Whether the request's duration is what is wanted; else the shortest that obeys the
+            limits is.
 
         Returns
         -------
@@ -133,15 +135,15 @@ class DurationRules:
         def plan_of(time: float) -> Plan:
             return plan(request.stretched(time), arm, options)
 
-        if duration is None:
+        if not is_prescribed:
             return self._shortest(plan_of, self.shortest), None
-        prescribed = plan_of(duration)
+        prescribed = plan(request, arm, options)
         use = self.limits.worst(prescribed)
         if use is None or not use.is_exceeded:
             return prescribed, None
         scales = self.on_violation is OnViolation.SCALE
         # To stretch is to take longer, even if something shorter obeys as well.
-        found = self._shortest(plan_of, duration if scales else self.shortest, use)
+        found = self._shortest(plan_of, request.duration if scales else self.shortest, use)
         if scales:
             return found, use
         remedy = f'the shortest feasible duration is {found.duration:.9g} s'

@@ -292,18 +292,19 @@ def _plan_of_goal(
     for index, positions in enumerate(via):
         rules.check_pose(f'via point {index}', positions)
     rules.check_pose('the final', final)
+    is_prescribed = duration is not None
 
     try:
         request = _request(goal, start, duration or NOMINAL_DURATION)
         if not via or goal.duration is not None:
-            return rules.plan_within(request, arm, options, duration)
+            return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
         request = with_via_times(request, arm, options)
-        found, exceeded = rules.plan_within(request, arm, options, duration)
-        if duration is not None:
+        found, exceeded = rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
+        if is_prescribed:
             return found, exceeded
         # The best shares of the time depend on the time, if little.
         request = with_via_times(found.request, arm, options)
-        return rules.plan_within(request, arm, options, duration)
+        return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
     except InvalidRequest as error:
         raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
     except OutOfReach as error:

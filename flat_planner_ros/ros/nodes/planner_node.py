@@ -15,6 +15,7 @@
 """Planner node: goals in, certified flat motions and verdicts out (docs/interfaces.md)."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 import sys
 from time import perf_counter
 from typing import Any
@@ -86,12 +87,12 @@ class PlannerNode(Node):
     def _listen(self) -> None:
         """Subscribe to goals and joint states."""
         # As bytes: a message that is too long is refused before it takes seconds to be read.
-        self.create_subscription(
-            JointTrajectory, interfaces.GOAL, self._on_goal, interfaces.BURST, raw=True
-        )
-        self.create_subscription(
-            JointState, interfaces.GOAL_STATE, self._on_goal_state, interfaces.BURST, raw=True
-        )
+        for kind, topic, read in (
+            (JointTrajectory, interfaces.GOAL, conversions.goal_from_trajectory),
+            (JointState, interfaces.GOAL_STATE, conversions.goal_from_joint_state),
+        ):
+            heard = partial(self._answer, read)
+            self.create_subscription(kind, topic, heard, interfaces.BURST, raw=True)
         self.create_subscription(
             JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA
         )
@@ -119,14 +120,6 @@ class PlannerNode(Node):
         """Plan the next goals with changed parameters."""
         self._session.settings = settings.session
         self._efforts.configure(settings.stream_effort, settings.session.period)
-
-    def _on_goal(self, data: bytes) -> None:
-        """Answer a goal given as a trajectory."""
-        self._answer(lambda: conversions.goal_from_trajectory(data))
-
-    def _on_goal_state(self, data: bytes) -> None:
-        """Answer a goal given as a pose."""
-        self._answer(lambda: conversions.goal_from_joint_state(data))
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
@@ -178,12 +171,12 @@ class PlannerNode(Node):
         for ended in self._session.take_ended(self._now()):
             self._publish_status(diagnostics.ended_status(ended))
 
-    def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
-        """Give a goal exactly one verdict and, if it is accepted, carry it out."""
+    def _answer(self, read: Callable[..., Goal], *data: bytes) -> DiagnosticStatus:
+        """Give the goal that is read from data exactly one verdict; carry it out if accepted."""
         goal = None
         started = perf_counter()
         try:
-            goal = read()
+            goal = read(*data)
             motion = self._session.submit(goal, self._now(), self._now)
         except RequestRejected as error:
             status = diagnostics.rejected_status(error, goal)

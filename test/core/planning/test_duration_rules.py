@@ -63,16 +63,10 @@ def rules_of(limits, on_violation=OnViolation.REJECT, joints=('shoulder', 'elbow
     )
 
 
-def half_turn(arm):
+def half_turn(arm, duration):
     """Return the paper's motion, its arm and its cost."""
-    request = MotionRequest(start=[0.0, 0.0], final=[pi, 0.0], duration=1.0)
+    request = MotionRequest(start=[0.0, 0.0], final=[pi, 0.0], duration=duration)
     return request, arm, PlanningOptions(strategy=Strategy.POLYNOMIAL)
-
-
-def half_turn_in(duration, arm):
-    """Return the plan of the paper's motion in another time."""
-    request, arm, options = half_turn(arm)
-    return plan(replace(request, duration=duration), arm, options)
 
 
 def peak_effort(planned):
@@ -82,7 +76,7 @@ def peak_effort(planned):
 
 def test_a_duration_that_obeys_is_kept(paper_arm):
     rules = rules_of(JointLimits.of(2, effort=[EFFORT, inf]))
-    found, exceeded = rules.plan_within(*half_turn(paper_arm), 1.1)
+    found, exceeded = rules.plan_within(*half_turn(paper_arm, 1.1), is_prescribed=True)
     assert found.duration == 1.1
     assert exceeded is None
 
@@ -90,9 +84,9 @@ def test_a_duration_that_obeys_is_kept(paper_arm):
 def test_a_duration_too_short_is_refused_with_the_joint_and_all_numbers(paper_arm):
     rules = rules_of(JointLimits.of(2, effort=[EFFORT, inf], velocity=[50.0, inf]))
     with pytest.raises(RequestRejected) as refusal:
-        rules.plan_within(*half_turn(paper_arm), 0.8)
+        rules.plan_within(*half_turn(paper_arm, 0.8), is_prescribed=True)
     error = refusal.value
-    tight = half_turn_in(0.8, paper_arm)
+    tight = plan(*half_turn(paper_arm, 0.8))
     assert error.reason is Reason.EFFORT_LIMIT
     assert error.joint == 'shoulder'
     assert abs(error.value) == pytest.approx(peak_effort(tight), rel=1e-9)
@@ -103,48 +97,49 @@ def test_a_duration_too_short_is_refused_with_the_joint_and_all_numbers(paper_ar
         assert number in str(error)
     # The text is the number, and the number obeys.
     again = float(f'{error.duration_min:.9g}')
-    assert rules.plan_within(*half_turn(paper_arm), again)[0].duration == again
+    found, _ = rules.plan_within(*half_turn(paper_arm, again), is_prescribed=True)
+    assert found.duration == again
 
 
 def test_a_velocity_is_told_from_an_effort(paper_arm):
     rules = rules_of(JointLimits.of(2, effort=[1.0, inf], velocity=[6.0, inf]))
     with pytest.raises(RequestRejected) as refusal:
-        rules.plan_within(*half_turn(paper_arm), 0.8)
+        rules.plan_within(*half_turn(paper_arm, 0.8), is_prescribed=True)
     assert refusal.value.reason is Reason.VELOCITY_LIMIT
     assert 'rad/s' in str(refusal.value)
 
 
 def test_a_duration_too_short_is_stretched_on_request(paper_arm):
     rules = rules_of(JointLimits.of(2, effort=[EFFORT, inf]), OnViolation.SCALE)
-    found, exceeded = rules.plan_within(*half_turn(paper_arm), 0.8)
+    found, exceeded = rules.plan_within(*half_turn(paper_arm, 0.8), is_prescribed=True)
     assert found.duration == pytest.approx(1.00410, rel=1e-3)
     assert peak_effort(found) <= EFFORT
-    assert abs(exceeded.value) == pytest.approx(peak_effort(half_turn_in(0.8, paper_arm)))
+    assert abs(exceeded.value) == pytest.approx(peak_effort(plan(*half_turn(paper_arm, 0.8))))
 
 
 def test_to_stretch_is_not_to_shorten():
     # Only motions of 1.3 to 2.8 s lift this load; 5 s cannot be stretched to that.
-    request = MotionRequest(start=[-1.5, 1.5, 0.0], final=[0.6, -0.6, 0.0], duration=1.0)
+    request = MotionRequest(start=[-1.5, 1.5, 0.0], final=[0.6, -0.6, 0.0], duration=5.0)
     lift = (request, LOADED, PlanningOptions(strategy=Strategy.POLYNOMIAL))
     limits = JointLimits.of(3, effort=[5.6, inf, inf])
     joints = ('a', 'b', 'c')
     with pytest.raises(RequestRejected) as stretched:
-        rules_of(limits, OnViolation.SCALE, joints).plan_within(*lift, 5.0)
+        rules_of(limits, OnViolation.SCALE, joints).plan_within(*lift, is_prescribed=True)
     assert stretched.value.duration_min is None
     assert 'no duration from 5 to 600 s' in str(stretched.value)
     with pytest.raises(RequestRejected) as refused:
-        rules_of(limits, OnViolation.REJECT, joints).plan_within(*lift, 5.0)
+        rules_of(limits, OnViolation.REJECT, joints).plan_within(*lift, is_prescribed=True)
     assert 1.0 < refused.value.duration_min < 2.0
     assert refused.value.reason is Reason.EFFORT_LIMIT
 
 
 def test_a_static_load_is_named_as_such():
-    request = MotionRequest(start=[pi / 2, 0.0, 0.0], final=[0.0, 0.0, 0.0], duration=1.0)
+    request = MotionRequest(start=[pi / 2, 0.0, 0.0], final=[0.0, 0.0, 0.0], duration=2.0)
     words = 'the effort of a at rest in the final pose is 5.886 N m'
     rules = rules_of(JointLimits.of(3, effort=[3.0, inf, inf]), joints=('a', 'b', 'c'))
-    for duration in (None, 2.0):
+    for is_prescribed in (False, True):
         with pytest.raises(RequestRejected, match=words) as refusal:
-            rules.plan_within(request, LOADED, PlanningOptions(), duration)
+            rules.plan_within(request, LOADED, PlanningOptions(), is_prescribed=is_prescribed)
         assert refusal.value.reason is Reason.EFFORT_LIMIT
         assert refusal.value.value == pytest.approx(5.886, rel=1e-3)
 

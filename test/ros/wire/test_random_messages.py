@@ -34,6 +34,7 @@ from flat_planner_ros.ros.nodes.plant_node import PlantNode
 from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.parameters.plant import ROWS as PLANT_ROWS
 from flat_planner_ros.ros.wire import interfaces, stamps
+from flat_planner_ros.ros.wire.conversions import goal_from_trajectory
 from hypothesis import given, HealthCheck, Phase, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -251,8 +252,9 @@ def test_goals_leave_no_memory_behind(graph):
     def send(count):
         for _ in range(count):
             # Straight to the node: what collects messages here would grow itself.
-            goals.planner._on_goal(serialize_message(goal(1.0, random.uniform(0.5, 3.0))))
-            goals.planner._on_goal(serialize_message(goal(1.0, -1.0)))
+            for final in (random.uniform(0.5, 3.0), -1.0):
+                data = serialize_message(goal(1.0, final))
+                goals.planner._answer(goal_from_trajectory, data)
             goals.planner._report_ended()
 
     send(300)
