@@ -24,7 +24,11 @@ from flat_planner_ros.core.insensitive.insensitivity import (
     UncertaintyBox,
 )
 from flat_planner_ros.core.insensitive.law import check_insensitivity, insensitive_motion
-from flat_planner_ros.core.insensitive.residual import predict_residual, PredictedResidual
+from flat_planner_ros.core.insensitive.residual import (
+    predict_residual,
+    PredictedResidual,
+    servo_effort,
+)
 from flat_planner_ros.core.insensitive.shapers import shaped_quintic, Shaper
 
 __all__ = [
@@ -38,6 +42,7 @@ __all__ = [
     'Nominal',
     'predict_residual',
     'PredictedResidual',
+    'servo_effort',
     'shaped_quintic',
     'Shaper',
     'UncertaintyBox',

@@ -45,8 +45,8 @@ MAX_POINTS = 257
 MEAN_NODES = 4
 """Gauss-Legendre nodes over either side of the box, plus one per radian of turn."""
 
-MAX_MEAN_NODES = 24
-"""Most of them."""
+MAX_MEAN_NODES = (24, 24, 8)
+"""Most of them over stiffness, damping and inertia, which acts like both others together."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,7 +193,7 @@ class Oscillator:
             begin[axis] = low
             end[axis] = high
             count = MEAN_NODES + ceil(self._turn(begin, end, duration)) if low < high else 1
-            places, shares = legendre.leggauss(min(count, MAX_MEAN_NODES))
+            places, shares = legendre.leggauss(min(count, MAX_MEAN_NODES[axis]))
             points = np.repeat(points, len(places), axis=0)
             points[:, axis] += np.tile(0.5 * (high - low) * places, len(weights))
             weights = np.multiply.outer(weights, 0.5 * shares).ravel()

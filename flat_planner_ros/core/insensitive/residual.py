@@ -70,7 +70,7 @@ def residual_amplitude(
     start: tuple[float, float] = (0.0, 0.0),
 ) -> FloatArray:
     """
-    Return what a motion leaves behind that is played with linear interpolation.
+    Return what a motion leaves behind, efforts joined linearly or followed by a servo.
 
     Parameters
     ----------
@@ -94,7 +94,8 @@ def residual_amplitude(
 
     References
     ----------
-    (I3) of docs/derivation.md: exact for signals that are linear between the samples.
+    (I3) of docs/derivation.md: exact for efforts that are linear between the samples; smooth
+    accelerations that begin and end at 0 by the trapezoidal rule, which converges fastest there.
 
     """
     step = duration / (len(signal) - 1)
@@ -105,17 +106,63 @@ def residual_amplitude(
     fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
     coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
     total = np.einsum('rp,rp->p', padded.reshape(rows, BLOCK) @ fine, coarse)
-    hat = (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2
+    hat, half_hat = _weights(oscillator.drive, turn)
     driven = -step * oscillator.gain * hat * total
     angle, velocity = start
     if angle or velocity or signal[0]:
         # In motion: the first sample has half a hat, and the joint brings its own oscillation.
-        half_hat = (np.expm1(-turn) + turn) / turn**2
         missing = (hat - half_hat) * signal[0] * step * oscillator.gain
         free = velocity - poles.conj() * angle
         driven += np.exp(duration * poles) * (free + missing)
     amplitudes: FloatArray = np.abs(driven) / poles.imag
     return amplitudes
+
+
+def _weights(
+    drive: Drive, turn: ComplexArray
+) -> tuple[ComplexArray | float, ComplexArray | float]:
+    """Return the weight of a sample between others, and of the first one."""
+    if drive is Drive.POSITION:
+        return 1.0, 0.5
+    return (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2, (np.expm1(-turn) + turn) / turn**2
+
+
+def servo_effort(arm: PlanarArm, acceleration: FloatArray, duration: float) -> FloatArray:
+    """
+    Return the effort that a servo needs, the passive joint's reaction in it.
+
+    Parameters
+    ----------
+    arm
+        Nominal model; must be flat.
+    acceleration
+        Of link n-1 in absolute angle at even times, both ends included, shape (m,) [rad/s^2].
+    duration
+        From the first to the last [s].
+
+    Returns
+    -------
+    FloatArray
+        Effort of joint n-1 at these times, without friction, shape (m,) [N m].
+
+    """
+    (pole,) = Oscillator.of(arm, Drive.POSITION).poles(np.ones((1, 2)))
+    turn = pole * duration / (len(acceleration) - 1)
+    # Exact for accelerations that are linear between the samples.
+    passed = np.expm1(turn)
+    late = (passed - turn) / turn / pole
+    pushes = acceleration[:-1] * (passed / pole - late) + acceleration[1:] * late
+    states, state, decay = [0j], 0j, complex(passed + 1.0)
+    for push in pushes.tolist():
+        state = decay * state - push
+        states.append(state)
+    swing = np.array(states)
+    angle = swing.imag / pole.imag
+    velocity = swing.real + pole.real * angle
+    both, last = arm.inertia_star
+    effort: FloatArray = (both - last) * acceleration
+    effort -= arm.stiffness * angle + arm.damping * velocity
+    return effort
 
 
 def legendre_residuals(

@@ -23,7 +23,7 @@ nominal oscillation apart, so that their oscillations cancel on the nominal arm 
 from enum import Enum
 from math import comb, exp, pi, sqrt
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import Drive, FloatArray, InvalidRequest, PlanarArm
 import numpy as np
 
 
@@ -41,10 +41,15 @@ class Shaper(Enum):
 
 
 def shaped_quintic(
-    arm: PlanarArm, distance: float, duration: float, shaper: Shaper, times: FloatArray
+    arm: PlanarArm,
+    distance: float,
+    duration: float,
+    shaper: Shaper,
+    times: FloatArray,
+    drive: Drive = Drive.EFFORT,
 ) -> FloatArray:
     """
-    Return the effort of joint n-1 of a shaped rigid motion from rest to rest.
+    Return what drives a shaped rigid motion from rest to rest.
 
     Parameters
     ----------
@@ -58,11 +63,13 @@ def shaped_quintic(
         Which impulses.
     times
         From the start, shape (m,) [s].
+    drive
+        What moves joint n-1.
 
     Returns
     -------
     FloatArray
-        Effort, shape (m,) [N m].
+        Effort of joint n-1 [N m], or acceleration of link n-1 [rad/s^2], shape (m,).
 
     Raises
     ------
@@ -74,7 +81,7 @@ def shaped_quintic(
     (I14) of docs/derivation.md.
 
     """
-    mode = arm.natural_mode()
+    mode = arm.natural_mode(held=drive is Drive.POSITION)
     copies = shaper.value
     delay = 0.0
     ratio = 0.0
@@ -89,11 +96,11 @@ def shaped_quintic(
             f'the impulses of {shaper.name} take {(copies - 1) * delay:.3g} s, the whole motion '
             f'only {duration:.3g} s'
         )
-    effort = np.zeros(len(times))
+    signal = np.zeros(len(times))
     for copy in range(copies):
         share = comb(copies - 1, copy) * ratio**copy / (1.0 + ratio) ** (copies - 1)
         u = np.clip((times - copy * delay) / base, 0.0, 1.0)
         # Second derivative of 10 u^3 - 15 u^4 + 6 u^5, zero at both ends and beyond.
-        effort += share * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
-    effort *= arm.inertia_star.both * distance / base**2
-    return effort
+        signal += share * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
+    signal *= distance / base**2
+    return signal if drive is Drive.POSITION else arm.inertia_star.both * signal

@@ -92,6 +92,12 @@ class PlanSamples:
         """Second derivatives of the positions, shape (m, n) [rad/s^2]."""
         return self._joints[2]
 
+    @property
+    def driving_acceleration(self) -> FloatArray:
+        """Acceleration of link n-1 in absolute angle, which a servo gives it, (m,) [rad/s^2]."""
+        driving: FloatArray = self.accelerations[:, :-1].sum(axis=1)
+        return driving
+
     @cached_property
     def efforts(self) -> FloatArray:
         """

@@ -20,6 +20,7 @@ from math import isfinite
 
 from flat_planner_ros.core.arm import (
     checked_array,
+    Drive,
     FlatModel,
     FlatPlannerError,
     FloatArray,
@@ -152,6 +153,8 @@ class PlanningOptions:
         Whether the efforts include what the motors' friction takes, as the model has it.
     insensitivity
         Uncertainty of the model, and what the strategy `insensitive` makes of it.
+    drive
+        What moves joint n-1, on which depends what an arm other than the model does.
 
     """
 
@@ -162,6 +165,7 @@ class PlanningOptions:
     flat_model: FlatModel = FlatModel.EXACT
     compensate_friction: bool = False
     insensitivity: Insensitivity = field(default_factory=Insensitivity)
+    drive: Drive = Drive.EFFORT
 
     def __post_init__(self) -> None:
         """Lock a copy of the matrix."""

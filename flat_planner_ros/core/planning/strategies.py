@@ -101,13 +101,13 @@ def _insensitive(
 ) -> OwnMotion:
     """Return the insensitive motion; only the exact flat map tells what it leaves."""
     _check_flat_model(options)
-    return insensitive_motion(arm, duration, options.insensitivity, distance)
+    return insensitive_motion(arm, duration, options.insensitivity, distance, options.drive)
 
 
 def _check_insensitive(arm: PlanarArm, options: PlanningOptions) -> None:
     """Refuse another flat map, and arms that do not oscillate."""
     _check_flat_model(options)
-    check_insensitivity(arm, options.insensitivity)
+    check_insensitivity(arm, options.insensitivity, options.drive)
 
 
 def _check_flat_model(options: PlanningOptions) -> None:

@@ -21,11 +21,18 @@ Nothing here is simulated: every residual is an integral over the effort (`insen
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import (
+    Drive,
+    FlatPlannerError,
+    FloatArray,
+    InvalidRequest,
+    PlanarArm,
+)
 from flat_planner_ros.core.insensitive import (
     Nominal,
     predict_residual,
     PredictedResidual,
+    servo_effort,
     shaped_quintic,
     Shaper,
 )
@@ -96,14 +103,15 @@ class TradeoffPoint:
 
 def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> PredictedResidual:
     """
-    Return what a plan leaves behind, as it is played with linear interpolation.
+    Return what a plan leaves behind, as it is played.
 
     Parameters
     ----------
     planned
-        The motion; its options say what may differ from the model.
+        The motion; its options say what may differ from the model, and what drives the arm.
     samples
-        The command's even grid; None for one that is as good as continuous.
+        The even grid of a command whose efforts are joined linearly; None for one that is as good
+        as continuous, which a servo always follows.
 
     Raises
     ------
@@ -111,17 +119,19 @@ def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> Predi
         An arm within the uncertainty does not oscillate.
 
     """
-    if samples is None:
+    drive = planned.options.drive
+    if samples is None or drive is Drive.POSITION:
         samples = planned.sample(planned.duration / INTERVALS)
-    start = (0.0, 0.0)
+    start = None
     if planned.request.start_jets is not None:
         start = (float(samples.positions[0, -1]), float(samples.velocities[0, -1]))
     return predict_residual(
         planned.problem.arm,
-        samples.driving_effort,
+        samples.driving_effort if drive is Drive.EFFORT else samples.driving_acceleration,
         planned.duration,
         planned.options.insensitivity.box,
         start,
+        drive=drive,
     )
 
 
@@ -175,15 +185,16 @@ def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:
         found = [_point_of('polynomial', plan(request, arm, options))]
     except InvalidRequest:
         return ()
+    drive, box = planned.options.drive, planned.options.insensitivity.box
     times = np.linspace(0.0, request.duration, INTERVALS + 1)
     distance = float(np.sum(request.final) - np.sum(request.start))
     for shaper in Shaper:
         try:
-            effort = shaped_quintic(arm, distance, request.duration, shaper, times)
+            signal = shaped_quintic(arm, distance, request.duration, shaper, times, drive)
         except InvalidRequest:
             continue
-        box = planned.options.insensitivity.box
-        residual = predict_residual(arm, effort, request.duration, box)
+        residual = predict_residual(arm, signal, request.duration, box, drive=drive)
+        effort = signal if drive is Drive.EFFORT else servo_effort(arm, signal, request.duration)
         name = 'quintic' if shaper is Shaper.NONE else f'{shaper.name.lower()}_quintic'
         found.append(_point(name, request.duration, effort, residual))
     return tuple(found)
