@@ -216,11 +216,7 @@ ROWS = [
         lower=0.0,
     ),
     Row(
-        'execute',
-        SessionSettings.execute,
-        '',
-        'publish commands',
-        'false = plan and report only',
+        'execute', SessionSettings.execute, '', 'publish commands', 'false = plan and report only'
     ),
     Row('command.include_passive_joint', True, '', 'name the passive joint in the command'),
     Row('command.include_effort', True, '', 'put the feed-forward effort into the command'),
