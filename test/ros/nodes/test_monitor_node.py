@@ -385,9 +385,9 @@ def _malformed():
         'header.stamp': unstamped,
         '1 positions for 2': short,
         'ascending': backwards,
-        'positions of a motion must be finite': undefined,
+        'positions must be finite, got nan rad': undefined,
         'unique': twice,
-        'velocities of a motion must be finite': infinite,
+        'velocities must be finite, got inf rad/s': infinite,
         'joint names': JointTrajectory(),
     }
 
@@ -551,7 +551,7 @@ def test_parameters_can_be_changed_even_for_the_motion_being_watched(graph, benc
         ({'window': 0.3}, 'one period of the expected oscillation, 0.642 s'),
         ({'window': 100.0}, ''),
         ({'timeout': nan}, 'timeout'),
-        ({'settling_band': 0.0}, 'settling_band must be positive'),
+        ({'settling_band': 0.0}, 'settling_band must be finite and above 0 rad'),
         ({'joints': ['a', 'b']}, ''),
         ({'window': 3}, ''),
     ],
