@@ -258,6 +258,7 @@ def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:
 
 def _angles(name: str, values: FloatArray) -> FloatArray:
     """Return a locked copy of a finite vector."""
-    return checked_array(
-        f'{name} angles', values, 'rad', shape=(np.size(values),), error=InvalidRequest
-    )
+    angles = np.array(values, dtype=float)
+    if angles.ndim != 1 or not np.isfinite(angles).all():
+        raise InvalidRequest(f'{name} angles must be a finite vector, got {angles}')
+    return locked(angles)
