@@ -43,6 +43,7 @@ WINGS = {
     'plant': 'arm',
     'monitor': 'arm',
     'tracking': 'arm',
+    'model_fit': 'arm',
 }
 """The wings of the core, each with the others from whose public lists it may import."""
 

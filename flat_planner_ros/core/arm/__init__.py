@@ -27,6 +27,7 @@ from flat_planner_ros.core.arm.counterbalance import (
     displaced_com,
     suggest_counterbalances,
 )
+from flat_planner_ros.core.arm.dynamics import coulomb_share, COULOMB_VELOCITY
 from flat_planner_ros.core.arm.errors import (
     FlatPlannerError,
     InvalidCommand,
@@ -60,6 +61,8 @@ __all__ = [
     'checked_array',
     'ComplexArray',
     'ControlBlock',
+    'coulomb_share',
+    'COULOMB_VELOCITY',
     'Counterbalances',
     'counterbalances',
     'displaced_com',

@@ -35,6 +35,11 @@ COULOMB_VELOCITY = 1e-2
 """Joint velocity at which Coulomb friction has reached tanh(1) of its value [rad/s]."""
 
 
+def coulomb_share(velocity: FloatArray) -> FloatArray:
+    """Return the share of Coulomb friction that acts at joint velocities [rad/s], -1 to 1 [-]."""
+    return np.tanh(velocity / COULOMB_VELOCITY)
+
+
 class ArmDynamics:
     """
     Dynamics of an arm, of the constants that a `PlanarArm` has; abstract.
@@ -73,9 +78,7 @@ class ArmDynamics:
     def friction(self, dq: FloatArray) -> FloatArray:
         """Return what friction takes from the actuated joints [N m], shape (..., n-1)."""
         motor = dq[..., :-1]
-        return self.viscous_friction * motor + self.coulomb_friction * np.tanh(
-            motor / COULOMB_VELOCITY
-        )
+        return self.viscous_friction * motor + self.coulomb_friction * coulomb_share(motor)
 
     def passive_effort(self, q_n: Real, dq_n: Real) -> Real:
         """Return the effort of spring and damper -k q_n - c dq_n [N m]."""

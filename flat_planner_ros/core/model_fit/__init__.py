@@ -1,0 +1,27 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Model fit: the whole model of an arm from recorded angles and efforts."""
+
+from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
+from flat_planner_ros.core.model_fit.fit import fit_model, Trust
+from flat_planner_ros.core.model_fit.measurements import Measurements
+
+__all__ = [
+    'fit_model',
+    'Measurements',
+    'ModelFit',
+    'ParameterEstimate',
+    'Trust',
+]

@@ -1,0 +1,132 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How far a fit can be believed: residuals that err alike, and what is not modelled."""
+
+from collections.abc import Sequence
+
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.refinement import CHANNELS, Linearisation
+import numpy as np
+
+LONGEST_LAG = 0.25
+"""Longest lag of an autocorrelation, relative to the segment [-]."""
+
+FAR_PRIOR = 1e4
+"""Size of a step that no data need to exclude, relative to the parameters' scales [-]."""
+
+EXCESS = 1.3
+"""Residual relative to the noise from which the model's structure is in doubt [-]."""
+
+REGULAR = 6.0
+"""Samples that err alike from which a residual is regular, not noise [-]."""
+
+REGULAR_EXCESS = 1.08
+"""Regular residual relative to the noise from which the structure is in doubt [-]."""
+
+MODEL_FLOOR = 1e-4
+"""Residual that simulation and interpolation leave, relative to the motion's spread [-]."""
+
+
+def correlation_length(residuals: Sequence[FloatArray]) -> float:
+    """
+    Return how many samples are worth one independent one, at least 1 [-].
+
+    Parameters
+    ----------
+    residuals
+        Of one channel in each segment, shape (samples,).
+
+    Notes
+    -----
+    The sum of the autocorrelations over its initial positive pairs (Geyer 1992).
+
+    """
+    lags = max(2, int(LONGEST_LAG * min(map(len, residuals))))
+    power = sum(float(part @ part) for part in residuals)
+    if power == 0.0:
+        return 1.0
+    correlation = np.sum([_products(part, lags) for part in residuals], axis=0)
+    pairs = (correlation[: lags // 2 * 2].reshape(-1, 2) / power).sum(axis=1)
+    negative = np.flatnonzero(pairs < 0.0)
+    count = int(negative[0]) if negative.size else pairs.size
+    return max(1.0, 2.0 * float(pairs[:count].sum()) - 1.0)
+
+
+def _products(values: FloatArray, lags: int) -> FloatArray:
+    """Return the sums of products of values that are 0, 1, ... samples apart, shape (lags,)."""
+    return np.array([float(values[lag:] @ values[: values.size - lag]) for lag in range(lags)])
+
+
+def covariance(around: Linearisation, scales: FloatArray) -> FloatArray:
+    """
+    Return the covariance of the free parameters, in units of their scales.
+
+    Parameters
+    ----------
+    around
+        The last linearisation, its residuals divided by their own spread.
+    scales
+        Of the free parameters, shape (free,).
+
+    Notes
+    -----
+    A sandwich of the normal equations, of three kinds, the largest error of each parameter
+    counting: samples that err alike are one, by the mean autocorrelation; the scores as they are,
+    with those of their neighbours (Newey and West 1987); and the rounding of encoders, one error
+    as long as they stand still, of which a few rests show less than there is.
+
+    """
+    size = np.outer(scales, scales)
+    lengths = [
+        correlation_length([part[:, channel] for part in around.residuals])
+        for channel in range(CHANNELS)
+    ]
+    prior = np.eye(scales.size) / FAR_PRIOR**2
+    inverse = np.linalg.inv(around.normal.sum(axis=0) * size + prior)
+    by_length = inverse @ (np.tensordot(lengths, around.normal, axes=1) * size + prior) @ inverse
+    by_scores = inverse @ (around.scatter * size) @ inverse
+    by_rounding = inverse @ (around.rounding * size) @ inverse
+    own = np.maximum(np.diag(by_scores), np.diag(by_rounding))
+    larger = np.sqrt(np.maximum(own / np.diag(by_length), 1.0))
+    result: FloatArray = by_length * np.outer(larger, larger)
+    return result
+
+
+def doubt(around: Linearisation, spread: FloatArray, noise: FloatArray, motion: FloatArray) -> str:
+    """
+    Return what the model leaves unexplained, empty if noise explains it.
+
+    Parameters
+    ----------
+    around
+        The last linearisation.
+    spread, noise
+        Root mean square of the residual and of the noise of either channel, shape (2,) [rad].
+    motion
+        Root mean square of the motion of either channel, shape (2,) [rad].
+
+    """
+    names = 'link n-1', 'the passive joint'
+    found = []
+    for channel in range(CHANNELS):
+        length = correlation_length([part[:, channel] for part in around.residuals])
+        allowed = float(np.hypot(noise[channel], MODEL_FLOOR * motion[channel]))
+        ratio = float(spread[channel]) / allowed
+        if ratio > EXCESS or (ratio > REGULAR_EXCESS and length > REGULAR):
+            found.append(
+                f'{names[channel]} is {spread[channel]:.2g} rad off where noise is '
+                f'{noise[channel]:.2g} rad, {length:.0f} samples in a row alike'
+            )
+    return '; '.join(found)

@@ -1,0 +1,207 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The last two links of a flat arm in motion, for many models and many starts at once.
+
+In absolute angles their rows are linear, constant and independent of the pose and of all other
+joints, but for the friction of joint n-1 ((8) of docs/derivation.md):
+
+    (I*_{n-1} - I*_n) a'' = effort + k q + c q' - friction,    I*_n (a + q)'' = -k q - c q'
+
+with a the angle of link n-1 and q that of the passive joint. The linear part is carried from step
+to step exactly, by a matrix exponential, and the force as a parabola.
+"""
+
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import coulomb_share, COULOMB_VELOCITY, FloatArray
+import numpy as np
+import numpy.typing as npt
+
+NAMES = (
+    'inertia_star.both',
+    'inertia_star.last',
+    'stiffness',
+    'damping',
+    'viscous_friction',
+    'coulomb_friction',
+    'offset',
+    'delay',
+)
+"""What a motion of the last two links depends on, in the order of a vector of parameters."""
+
+BOTH, LAST, STIFFNESS, DAMPING, VISCOUS, COULOMB, OFFSET, DELAY = range(len(NAMES))
+
+STATES = 4
+"""Angles of link n-1 and of the passive joint, and their rates."""
+
+FRICTION_STEP = 1.3e-3
+"""Longest step where Coulomb friction acts [s]: a joint reverses within few of them."""
+
+FREE_STEP = 6e-3
+"""Longest step without [s]: the force is a parabola in it."""
+
+STIFF_SHARE = 0.5
+"""Largest decay of a velocity by Coulomb friction around rest in one step [-]."""
+
+
+TERMS = 16
+"""Terms of the exponential series; the next is below rounding for spectral radii up to 0.5."""
+
+
+class Forcing(NamedTuple):
+    """
+    What moves the last two links, on a grid of half steps.
+
+    Attributes
+    ----------
+    step
+        Time from one state to the next [s].
+    effort
+        Of joint n-1, for some models, shape (2 K + 1, variants, segments) [N m].
+    variant
+        Which of them each model takes, shape (models,).
+    base
+        Angular velocity of the link before n-1, shape (2 K + 1, segments) [rad/s].
+
+    """
+
+    step: float
+    effort: FloatArray
+    variant: npt.NDArray[np.intp]
+    base: FloatArray
+
+
+class _Step(NamedTuple):
+    """Transition (P, 4, 4), and what force at the start, middle and end adds (P, 4, 1)."""
+
+    transition: FloatArray
+    start: FloatArray
+    middle: FloatArray
+    end: FloatArray
+
+
+def step_for(parameters: FloatArray, has_friction: bool) -> float:
+    """Return the longest step for a model, shape (8,) [s]."""
+    stiffest = np.sqrt(parameters[STIFFNESS] / parameters[LAST]) + 1e-9
+    step = min(FREE_STEP, 0.2 / float(stiffest))
+    if has_friction:
+        link = parameters[BOTH] - parameters[LAST]
+        rate = abs(parameters[COULOMB]) / COULOMB_VELOCITY / link + 1e-9
+        step = min(step, FRICTION_STEP, STIFF_SHARE / float(rate))
+    return step
+
+
+def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> FloatArray:
+    """
+    Return the motion of every model from every start.
+
+    Parameters
+    ----------
+    models
+        Parameters in the order of NAMES, shape (models, 8); offset and delay are not used: the
+        former is added to what is seen, the latter is in the forcing.
+    starts
+        States at the first time, shape (models, 4, segments) [rad], [rad/s].
+    forcing
+        What moves them.
+
+    Returns
+    -------
+    FloatArray
+        States, shape (K + 1, models, 4, segments).
+
+    """
+    steps = (forcing.base.shape[0] - 1) // 2
+    states = np.empty((steps + 1, *starts.shape))
+    states[0] = starts
+    whole, half = _linear_step(models, forcing.step), _linear_step(models, forcing.step / 2)
+    viscous, coulomb = models[:, VISCOUS, None], models[:, COULOMB, None]
+    has_friction = bool(coulomb.any())
+    # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
+    drag = viscous * forcing.base[:, None, :]
+    for k in range(steps):
+        forces = forcing.effort[2 * k : 2 * k + 3, forcing.variant] + drag[2 * k : 2 * k + 3]
+        if has_friction:
+            forces = _with_friction(states[k], forces, forcing.base[2 * k :], coulomb, whole, half)
+        states[k + 1] = _moved(states[k], forces, whole)
+    return states
+
+
+def _linear_step(models: FloatArray, step: float) -> _Step:
+    """Return how states and forces act on the state a step later."""
+    link = models[:, BOTH] - models[:, LAST]
+    count = len(models)
+    # The force and its first two derivatives are states of their own: one exponential for all.
+    augmented = np.zeros((count, STATES + 3, STATES + 3))
+    augmented[:, 0, 2] = augmented[:, 1, 3] = 1.0
+    augmented[:, 2, 1] = models[:, STIFFNESS] / link
+    augmented[:, 2, 2] = -models[:, VISCOUS] / link
+    augmented[:, 2, 3] = models[:, DAMPING] / link
+    augmented[:, 2, 4] = 1.0 / link
+    augmented[:, 3] = -augmented[:, 2]
+    augmented[:, 3, 1] -= models[:, STIFFNESS] / models[:, LAST]
+    augmented[:, 3, 3] -= models[:, DAMPING] / models[:, LAST]
+    augmented[:, 4, 5] = augmented[:, 5, 6] = 1.0
+    flow = _exponential(step * augmented)[:, :STATES]
+    value, slope, bend = (flow[:, :, j : j + 1] for j in (4, 5, 6))
+    # The parabola through three forces: slope (-3, 4, -1)/h and second derivative (4, -8, 4)/h^2.
+    return _Step(
+        flow[:, :, :STATES],
+        value - 3 / step * slope + 4 / step**2 * bend,
+        4 / step * slope - 8 / step**2 * bend,
+        -slope / step + 4 / step**2 * bend,
+    )
+
+
+def _exponential(matrices: FloatArray) -> FloatArray:
+    """Return the exponentials of a stack of matrices; steps are short, so their series is."""
+    # Not scipy's: it is slow to import, and its threads get into each other's way.
+    total = term = np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape)
+    for order in range(1, TERMS + 1):
+        term = term @ matrices / order
+        total = total + term
+    return total
+
+
+def _moved(state: FloatArray, forces: FloatArray, step: _Step) -> FloatArray:
+    """Return the state a step later."""
+    first, middle, last = forces[:, :, None, :]
+    moved: FloatArray = step.transition @ state
+    moved += step.start * first
+    moved += step.middle * middle
+    moved += step.end * last
+    return moved
+
+
+def _with_friction(
+    state: FloatArray,
+    forces: FloatArray,
+    base: FloatArray,
+    coulomb: FloatArray,
+    whole: _Step,
+    half: _Step,
+) -> FloatArray:
+    """Return the forces less Coulomb friction, whose velocities are predicted in two stages."""
+    first = forces[0] - coulomb * coulomb_share(state[:, 2] - base[0])
+    # To the middle with the friction of the start, to the end with that of the middle.
+    held = forces[0] - first
+    near = (forces[0] + forces[1]) / 2 - held
+    velocity = _moved(state, np.array([first, near, forces[1] - held]), half)[:, 2]
+    middle = forces[1] - coulomb * coulomb_share(velocity - base[1])
+    ahead = 2 * (forces[1] - middle) - held
+    velocity = _moved(state, np.array([first, middle, forces[2] - ahead]), whole)[:, 2]
+    last = forces[2] - coulomb * coulomb_share(velocity - base[2])
+    return np.array([first, middle, last])

@@ -1,0 +1,360 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Output-error refinement: the simulated motion is brought to the measured one.
+
+Every segment of the recording starts from four unknowns of its own, which are eliminated in each
+step of Gauss and Newton (variable projection, Golub and Pereyra 1973): what errors add up to over
+a long recording stays out, and the work and memory grow with nothing but the number of segments.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.last_links import (
+    BOTH,
+    COULOMB,
+    DELAY,
+    Forcing,
+    LAST,
+    OFFSET,
+    STATES,
+    step_for,
+    STIFFNESS,
+    trajectories,
+)
+from flat_planner_ros.core.model_fit.signals import between, hermite, Segment
+import numpy as np
+import numpy.typing as npt
+
+DIFFERENCE = 1e-6
+"""Step of the difference quotients, relative to the parameters' scales [-]."""
+
+BLOCK = 20
+"""Segments that are simulated side by side: a minute of motion."""
+
+MOST_STEPS = 40
+"""Largest number of linearisations."""
+
+CONVERGED = 1e-4
+"""Largest last step, relative to the standard errors of white noise [-]."""
+
+SMALLEST = 1e-7
+"""Last step that is always small enough, relative to the scales [-]."""
+
+MOST_DAMPING = 1e8
+"""Marquardt's parameter from which nothing better is expected [-]."""
+
+NULL = 1e-10
+"""Curvature below which a direction is not told at all, relative to the largest [-]."""
+
+NEIGHBOURS = 1 / 6
+"""Distance up to which residuals may err alike, relative to a segment [-]: a free period."""
+
+CHANNELS = 2
+"""Angle of link n-1 and of the passive joint."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observed:
+    """
+    The last two links as measured.
+
+    Attributes
+    ----------
+    times
+        Shape (m,) [s].
+    angles
+        Of link n-1 and of the passive joint, shape (m, 2) [rad].
+    rates
+        Their smoothed velocities, shape (m, 2) [rad/s], for the first guess of the starts.
+    effort
+        Of joint n-1, shape (m,) [N m].
+    base
+        Smoothed angular velocity of link n-2, shape (m,) [rad/s].
+    moves
+        Whether either angle has left the place where its encoder stood, shape (m, 2).
+    rounding
+        Standard deviation of the encoders' rounding in either angle, shape (2,) [rad].
+    segments
+        Pieces to simulate.
+    is_linear
+        Whether efforts go straight from sample to sample, instead of on cubics.
+    refinement
+        By which the steps of the integration are divided [-].
+
+    """
+
+    times: FloatArray
+    angles: FloatArray
+    rates: FloatArray
+    effort: FloatArray
+    base: FloatArray
+    moves: npt.NDArray[np.bool_]
+    rounding: FloatArray
+    segments: Sequence[Segment]
+    is_linear: bool = False
+    refinement: float = 1.0
+
+
+class Linearisation(NamedTuple):
+    """
+    The misfit around one set of parameters, the starts of the segments eliminated.
+
+    Attributes
+    ----------
+    cost
+        Weighted sum of squares that is left with the best starts [-].
+    gradient
+        Shape (free,).
+    normal
+        Normal equations of either channel, shape (2, free, free).
+    scatter
+        Sums of products of neighbouring scores, with the kernel of Bartlett, shape (free, free).
+    rounding
+        The same for the rounding of encoders, which err alike as long as they stand still.
+    residuals
+        What is left of either channel in each segment, not weighted, (samples, 2) [rad].
+    corrections
+        For each segment the step of its start without a step of the parameters (4,), and the
+        change of that with them (4, free).
+
+    """
+
+    cost: float
+    gradient: FloatArray
+    normal: FloatArray
+    scatter: FloatArray
+    rounding: FloatArray
+    residuals: list[FloatArray]
+    corrections: list[tuple[FloatArray, FloatArray]]
+
+
+class Refined(NamedTuple):
+    """Parameters (8,), starts (segments, 4), spread (2,) [rad], and the last linearisation."""
+
+    parameters: FloatArray
+    starts: FloatArray
+    spread: FloatArray
+    around: Linearisation
+
+
+def first_starts(observed: Observed) -> FloatArray:
+    """Return measured states at the starts of the segments, shape (segments, 4)."""
+    first = [segment.first for segment in observed.segments]
+    return np.hstack((observed.angles[first], observed.rates[first]))
+
+
+def linearised(
+    observed: Observed,
+    model: FloatArray,
+    starts: FloatArray,
+    free: Sequence[int],
+    scales: FloatArray,
+    spread: FloatArray,
+) -> Linearisation:
+    """
+    Return misfit and sensitivities.
+
+    Parameters
+    ----------
+    observed
+        What was measured.
+    model
+        Parameters in the order of `last_links.NAMES`, shape (8,).
+    starts
+        States at the starts of the segments, shape (segments, 4).
+    free
+        Which parameters may change.
+    scales
+        Sizes of the parameters, for difference quotients, shape (8,).
+    spread
+        By which the residuals of either channel are divided, shape (2,) [rad].
+
+    """
+    count = len(free)
+    cost, gradient, normal = 0.0, np.zeros(count), np.zeros((CHANNELS, count, count))
+    scatter, rounding = np.zeros((count, count)), np.zeros((count, count))
+    residuals, corrections = [], []
+    pieces = _segments(observed, model, starts, free, scales)
+    for segment, (misfit, by_start, by_parameter) in zip(observed.segments, pieces, strict=True):
+        basis, triangle = np.linalg.qr((by_start / spread[:, None]).reshape(-1, STATES))
+        weighted = (misfit / spread).ravel()
+        columns = (by_parameter / spread[:, None]).reshape(weighted.size, count)
+        inside, inside_columns = basis.T @ weighted, basis.T @ columns
+        left, left_columns = weighted - basis @ inside, columns - basis @ inside_columns
+        cost += float(left @ left)
+        gradient += left_columns.T @ left
+        for channel in range(CHANNELS):
+            own = left_columns[channel::CHANNELS]
+            normal[channel] += own.T @ own
+            moves = observed.moves[segment.first : segment.last, channel]
+            share = observed.rounding[channel] / spread[channel]
+            rounding += share**2 * _alike(own, moves)
+        scores = (left[:, None] * left_columns).reshape(len(misfit), CHANNELS, count).sum(axis=1)
+        scatter += _neighbours(scores)
+        residuals.append(left.reshape(-1, CHANNELS) * spread)
+        solved = np.linalg.solve(triangle, np.column_stack((inside, inside_columns)))
+        corrections.append((-solved[:, 0], -solved[:, 1:]))
+    return Linearisation(cost, gradient, normal, scatter, rounding, residuals, corrections)
+
+
+def _alike(columns: FloatArray, moves: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the sum of products of rows that have one error until the encoder moves."""
+    begins = np.flatnonzero(np.append(True, moves[1:]))
+    sums = np.add.reduceat(columns, begins, axis=0)
+    product: FloatArray = sums.T @ sums
+    return product
+
+
+def _neighbours(scores: FloatArray) -> FloatArray:
+    """Return the sum of products of rows, the weight falling to zero with their distance."""
+    window = max(1, round(NEIGHBOURS * len(scores)))
+    padded = np.zeros((len(scores) + window, scores.shape[1]))
+    padded[: len(scores)] = scores
+    total = np.cumsum(padded, axis=0)
+    total[window:] -= total[:-window].copy()
+    product: FloatArray = total.T @ total / window
+    return product
+
+
+def refine(
+    observed: Observed,
+    parameters: FloatArray,
+    free: Sequence[int],
+    scales: FloatArray,
+    spread: FloatArray,
+    starts: FloatArray | None = None,
+) -> Refined:
+    """
+    Return the parameters with the least sum of squares (Levenberg and Marquardt).
+
+    Parameters are as for `linearised`; without starts those measured are taken.
+    """
+    point = parameters.copy(), first_starts(observed) if starts is None else starts
+    best = linearised(observed, *point, free, scales, spread)
+    damping = 0.0
+    for _ in range(MOST_STEPS):
+        step = _step(best, damping, scales[list(free)])
+        if _is_small(step, best, scales[list(free)]) or damping > MOST_DAMPING:
+            break
+        trial = _stepped(point, best, step, free)
+        there = linearised(observed, *trial, free, scales, spread)
+        is_better = there.cost <= best.cost * (1.0 + 1e-12)
+        if is_better:
+            point, best, damping = trial, there, damping / 10 if damping > 1e-6 else 0.0
+        else:
+            damping = max(10 * damping, 1e-4)
+    samples = sum(map(len, best.residuals))
+    unknowns = STATES * len(best.residuals) + len(free)
+    power = sum((left**2).sum(axis=0) for left in best.residuals)
+    found = np.sqrt(power / max(samples - unknowns / CHANNELS, 1.0))
+    return Refined(point[0], point[1], found, best)
+
+
+def _step(around: Linearisation, damping: float, scales: FloatArray) -> FloatArray:
+    """Return the step of the free parameters, damped by Marquardt's parameter."""
+    normal = around.normal.sum(axis=0) * np.outer(scales, scales)
+    normal += damping * np.diag(np.diag(normal))
+    step: FloatArray = -scales * np.linalg.lstsq(normal, scales * around.gradient, rcond=NULL)[0]
+    return step
+
+
+def _stepped(
+    point: tuple[FloatArray, FloatArray],
+    around: Linearisation,
+    step: FloatArray,
+    free: Sequence[int],
+) -> tuple[FloatArray, FloatArray]:
+    """Return parameters and starts after a step, shortened until the model has a meaning."""
+    share = 1.0
+    while True:
+        parameters = point[0].copy()
+        parameters[list(free)] += share * step
+        if parameters[BOTH] > parameters[LAST] > 0.0 < parameters[STIFFNESS]:
+            break
+        share /= 2
+    moved = np.array([own + by @ (share * step) for own, by in around.corrections])
+    return parameters, point[1] + moved
+
+
+def _is_small(step: FloatArray, around: Linearisation, scales: FloatArray) -> bool:
+    """Tell a step that changes nothing of interest."""
+    normal = around.normal.sum(axis=0)
+    samples = CHANNELS * sum(map(len, around.residuals))
+    in_errors = float(step @ normal @ step) / (around.cost / samples + 1e-300)
+    return in_errors < CONVERGED**2 or float(np.abs(step / scales).max()) < SMALLEST
+
+
+def _segments(
+    observed: Observed,
+    parameters: FloatArray,
+    starts: FloatArray,
+    free: Sequence[int],
+    scales: FloatArray,
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield for each segment the misfit (m, 2) and its derivatives (m, 2, 4) and (m, 2, free)."""
+    nudges = DIFFERENCE * scales[list(free)]
+    models = np.tile(parameters, (1 + STATES + len(free), 1))
+    models[1 + STATES + np.arange(len(free)), list(free)] += nudges
+    for first in range(0, len(observed.segments), BLOCK):
+        block = observed.segments[first : first + BLOCK]
+        begun = np.tile(starts[first : first + BLOCK].T, (len(models), 1, 1))
+        begun[1 : 1 + STATES] += DIFFERENCE * np.eye(STATES)[:, :, None]
+        seen = _seen(observed, block, models, begun)
+        for segment, angles in zip(block, seen, strict=True):
+            middle = angles[:, :1]
+            slopes = (angles[:, 1:] - middle).transpose(0, 2, 1)
+            by_start = slopes[:, :, :STATES] / DIFFERENCE
+            by_parameter = slopes[:, :, STATES:] / nudges
+            measured = observed.angles[segment.first : segment.last]
+            yield middle[:, 0] - measured, by_start, by_parameter
+
+
+def _seen(
+    observed: Observed, block: Sequence[Segment], models: FloatArray, starts: FloatArray
+) -> Iterator[FloatArray]:
+    """Yield for each segment what the sensors would show of every model, (m, models, 2) [rad]."""
+    t = observed.times
+    begins = t[[segment.first for segment in block]]
+    longest = max(float(t[s.last - 1] - t[s.first]) for s in block)
+    step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
+    steps = int(np.ceil(longest / step)) + 1
+    grid = begins + np.arange(2 * steps + 1)[:, None] * step / 2
+    states = trajectories(models, starts, _forcing(observed, models, grid, step))
+    for number, segment in enumerate(block):
+        elapsed = t[segment.first : segment.last] - begins[number]
+        node = np.minimum((elapsed / step).astype(int), steps - 1)
+        share = (elapsed / step - node)[:, None, None]
+        here, there = states[node, :, :, number], states[node + 1, :, :, number]
+        angles = hermite(
+            share, np.array(step), here[..., :2], there[..., :2], here[..., 2:], there[..., 2:]
+        )
+        angles[..., 1] += models[:, OFFSET]
+        yield angles
+
+
+def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: float) -> Forcing:
+    """Return what moves the models; efforts come later by the delay."""
+    delays, variant = np.unique(models[:, DELAY], return_inverse=True)
+    shifted = grid[:, None, :] - delays[:, None]
+    if observed.is_linear:
+        effort = np.interp(shifted, observed.times, observed.effort)
+    else:
+        effort = between(observed.times, observed.effort, shifted)
+    base = between(observed.times, observed.base, grid) if observed.base.any() else 0.0 * grid
+    return Forcing(step, effort, variant, base)

@@ -1,0 +1,130 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Signals between their samples, smoothed derivatives, and pieces of a recording."""
+
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import FloatArray
+import numpy as np
+
+GAP = 5.0
+"""Time between two samples that ends a segment, relative to the usual one [-]."""
+
+SHORTEST = 12
+"""Fewest samples of a segment: its start alone takes four unknowns [-]."""
+
+
+class Segment(NamedTuple):
+    """Samples first ... last-1 of a recording, simulated from a start of their own."""
+
+    first: int
+    last: int
+
+
+def segments_of(times: FloatArray, period: float, longest: float) -> list[Segment]:
+    """
+    Return even pieces of a recording, none longer than asked, none across a gap.
+
+    Parameters
+    ----------
+    times
+        Of the samples, shape (m,) [s].
+    period
+        Usual time between two of them [s].
+    longest
+        Bound on the time that a piece spans [s].
+
+    """
+    gaps = np.flatnonzero(np.diff(times) > GAP * period) + 1
+    pieces = []
+    for first, last in zip([0, *gaps], [*gaps, times.size], strict=True):
+        count = max(1, round(float(times[last - 1] - times[first]) / longest))
+        cuts = np.linspace(first, last, count + 1).astype(int)
+        pieces += [Segment(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+    return [piece for piece in pieces if piece.last - piece.first >= SHORTEST]
+
+
+def between(times: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
+    """
+    Return samples interpolated by cubic Hermite polynomials with central slopes.
+
+    Local and without the ringing of a spline where an effort jumps; the ends are held.
+
+    Parameters
+    ----------
+    times, values
+        Samples, shape (m,).
+    at
+        Times, any shape [s].
+
+    """
+    inside = np.clip(at, times[0], times[-1])
+    index = np.clip(np.searchsorted(times, inside, side='right') - 1, 0, times.size - 2)
+    slopes = np.gradient(values, times)
+    step = times[index + 1] - times[index]
+    ends = values[index], values[index + 1], slopes[index], slopes[index + 1]
+    return hermite((inside - times[index]) / step, step, *ends)
+
+
+def hermite(
+    share: FloatArray,
+    step: FloatArray,
+    first: FloatArray,
+    last: FloatArray,
+    first_slope: FloatArray,
+    last_slope: FloatArray,
+) -> FloatArray:
+    """Return the cubic with given ends at a share, 0 to 1, of a step; shapes that broadcast."""
+    rise = last - first
+    bend = step * first_slope - rise
+    back = rise - step * last_slope
+    result: FloatArray = first + share * (rise + (1 - share) * ((1 - share) * bend + share * back))
+    return result
+
+
+def derivatives(
+    times: FloatArray, angles: FloatArray, width: float, degree: int = 4
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return smoothed angles and their first two derivatives, each as (m, n).
+
+    A polynomial is fitted around every sample (Savitzky and Golay 1964), on an even grid of the
+    usual period to which uneven samples are brought first.
+
+    Parameters
+    ----------
+    times, angles
+        Samples, shapes (m,) [s] and (m, n) [rad].
+    width
+        Time that the polynomials span [s].
+    degree
+        Of the polynomials.
+
+    """
+    # Slow to import, and only fits need it.
+    from scipy.signal import savgol_filter
+
+    period = float(np.median(np.diff(times)))
+    count = max(round(float(times[-1] - times[0]) / period), 2 * degree) + 1
+    grid = np.linspace(times[0], times[-1], count)
+    window = min(max(2 * round(width / period / 2) + 1, degree + 3 - degree % 2), count)
+    window -= 1 - window % 2
+    even = np.column_stack([np.interp(grid, times, column) for column in angles.T])
+    spacing = float(grid[1] - grid[0])
+    found = []
+    for order in range(3):
+        smooth = savgol_filter(even, window, degree, deriv=order, delta=spacing, axis=0)
+        found.append(np.column_stack([np.interp(times, grid, column) for column in smooth.T]))
+    return found[0], found[1], found[2]

@@ -1,0 +1,216 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The whole model from one recording: how near it comes, what it admits, what it refuses."""
+
+from math import pi
+
+from flat_planner_ros.core.arm import displaced_com, InvalidRequest, PlanarArm
+from flat_planner_ros.core.model_fit import fit_model, Measurements, Trust
+from free_arm import measured, pushes, simulated
+import numpy as np
+import pytest
+from recorded_arm import recorded
+from scipy.optimize import least_squares
+
+BELIEVED = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
+TRUE = PlanarArm.reduced(
+    inertia_star=(1.11 * 6.4e-4, 0.91 * 3.3e-5),
+    stiffness=0.87 * 3e-3,
+    damping=1.3 * 2e-5,
+    viscous_friction=[2e-4],
+    coulomb_friction=[5e-4],
+)
+
+TIMES = np.arange(0.0, 6.0, 0.005)
+FREE = {'both': 7e-4, 'last': 3e-5}
+STIFFNESS, DAMPING = 2.7e-3, 2.5e-5
+
+
+def linear(q, rate):
+    """Return the effort of the spring that the model has [N m]."""
+    return STIFFNESS * q + DAMPING * rate
+
+
+def six(arm):
+    """Return what the last two links of an arm depend on, shape (6,)."""
+    friction = arm.viscous_friction[-1], arm.coulomb_friction[-1]
+    return np.array([*arm.inertia_star, arm.stiffness, arm.damping, *friction])
+
+
+def z_scores(fit, arm):
+    """Return the errors of the six in standard errors."""
+    values = np.array([(e.value, e.std) for e in fit.estimates[:6]])
+    return (values[:, 0] - six(arm)) / values[:, 1]
+
+
+@pytest.mark.parametrize(
+    ('rate', 'noise', 'bits', 'bound'),
+    [(200.0, 0.0, 0, 0.002), (200.0, 1e-4, 14, 0.005), (50.0, 1e-3, 12, 0.02)],
+)
+def test_four_goals_tell_all_six(rate, noise, bits, bound):
+    step = 2 * pi / 2**bits if bits else 0.0
+    fit = fit_model(recorded(TRUE, BELIEVED, rate=rate, noise=noise, step=step), BELIEVED)
+    assert six(fit.arm) == pytest.approx(six(TRUE), rel=bound)
+    assert np.abs(z_scores(fit, TRUE)).max() < 4.0
+    assert all(estimate.is_told for estimate in fit.estimates)
+    assert fit.misfit == ''
+
+
+def test_a_delay_and_an_offset_are_found():
+    late, bent = 0.012, 0.03
+    seen = recorded(TRUE, BELIEVED, noise=1e-4)
+    efforts = np.interp(seen.times + late, seen.times, seen.efforts[:, 0])
+    shifted = Measurements(
+        times=seen.times, positions=seen.positions + [0.0, bent], efforts=efforts[:, None]
+    )
+    fit = fit_model(shifted, BELIEVED)
+    assert fit.estimate('delay').value == pytest.approx(late, abs=2e-4)
+    assert fit.estimate('offset').value == pytest.approx(bent, abs=1e-4)
+    assert six(fit.arm) == pytest.approx(six(TRUE), rel=0.01)
+
+
+def test_uneven_times_and_a_gap_do_no_harm():
+    rng = np.random.default_rng(1)
+    times = np.sort(rng.uniform(0.0, 6.0, 1200))
+    times = times[(times < 2.0) | (times > 2.4)]
+    fit = fit_model(measured(pushes, times, spring=linear, noise=1e-5, **FREE), BELIEVED)
+    assert [fit.arm.stiffness, fit.arm.damping] == pytest.approx([STIFFNESS, DAMPING], rel=0.005)
+    assert fit.arm.inertia_star == pytest.approx((7e-4, 3e-5), rel=0.005)
+
+
+def test_scipy_alone_finds_the_same_from_a_random_start():
+    """Second route: least_squares with an integrator, all from the start of the recording."""
+    times = np.arange(0.0, 2.0, 0.02)
+    seen = measured(pushes, times, spring=linear, noise=1e-3, seed=3, **FREE)
+    fit = fit_model(seen, BELIEVED)
+    unit = np.array([7e-4, 3e-5, STIFFNESS, DAMPING])
+
+    def miss(log):
+        both, last, k, c = unit * np.exp(log[:4])
+        angles = simulated(
+            pushes, times, both=both, last=last, spring=lambda q, v: k * q + c * v, start=log[4:]
+        )
+        return (angles - seen.positions).ravel()
+
+    start = np.append(np.random.default_rng(4).normal(0.0, 0.1, 4), np.zeros(4))
+    alone = unit * np.exp(least_squares(miss, start, x_scale='jac').x[:4])
+    stds = np.array([estimate.std for estimate in fit.estimates[:4]])
+    # Friction, offset and delay are free in the fit alone: the two may differ by noise.
+    assert np.abs((six(fit.arm)[:4] - alone) / stds).max() < 2.0
+    assert alone == pytest.approx(unit, rel=0.1)
+
+
+def test_a_swing_without_effort_tells_ratios_alone():
+    still = {'spring': linear, 'start': (0.0, 0.3, 0.0, 0.0), **FREE}
+    seen = measured(np.zeros_like, TIMES, noise=1e-4, **still)
+    fit = fit_model(seen, BELIEVED)
+    untold = {estimate.name for estimate in fit.estimates if not estimate.is_told}
+    assert {'inertia_star.last', 'coulomb_friction[1]', 'delay'} <= untold
+    assert fit.estimate('inertia_star.last').value == BELIEVED.inertia_star.last
+    assert 'effort' in fit.estimate('delay').remark
+    ratio = fit.arm.stiffness / fit.arm.inertia_star.last
+    assert ratio == pytest.approx(STIFFNESS / 3e-5, rel=0.01)
+
+
+def test_trusted_inertia_gives_the_scale_of_the_effort():
+    seen = recorded(TRUE, BELIEVED)
+    wrong = Measurements(times=seen.times, positions=seen.positions, efforts=seen.efforts / 1.25)
+    start = PlanarArm.reduced(
+        inertia_star=(TRUE.inertia_star.both, 3.3e-5), stiffness=3e-3, damping=2e-5
+    )
+    fit = fit_model(wrong, start, trust=Trust.INERTIA)
+    assert fit.effort_scale == pytest.approx(1.25, rel=1e-3)
+    assert six(fit.arm) == pytest.approx(six(TRUE), rel=2e-3)
+    assert fit.estimate('inertia_star.both').std == pytest.approx(0.0, abs=1e-12)
+    assert six(fit_model(wrong, start).arm) == pytest.approx(six(TRUE) / 1.25, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    'spring',
+    [
+        linear,
+        lambda q, v: linear(q * (1.0 + 0.05 * (q / 0.3) ** 2), v),
+        lambda q, v: linear(q - np.clip(q, -0.005, 0.005), v),
+    ],
+    ids=['as modelled', 'stiffens by 5 % at 0.3 rad', 'backlash of 5 mrad'],
+)
+def test_another_structure_is_noticed(spring):
+    fit = fit_model(measured(pushes, TIMES, spring=spring, noise=1e-4, **FREE), BELIEVED)
+    assert ('passive joint' in fit.misfit) == (spring is not linear)
+    assert fit.misfit in fit.text
+
+
+def test_an_imbalance_is_noticed():
+    links = {
+        'link_length': [0.1, 0.1],
+        'link_mass': [0.05, 0.02],
+        'link_inertia': [1e-4, 2e-5],
+        'counterbalance_mass': [0.14, 0.04],
+        'counterbalance_arm': [0.05, 0.025],
+        'stiffness': 5e-3,
+        'damping': 5e-5,
+    }
+    com = np.array([0.02, 0.05])
+    believed = PlanarArm.from_links(link_com=com, **links)
+    believed.check_flat()
+    moment = 0.02 * 0.04 * 0.025
+    off = displaced_com(com, links['link_mass'], [0.0, moment])
+    arms = believed, PlanarArm.from_links(link_com=off, **links)
+    balanced, unbalanced = (
+        fit_model(recorded(arm, believed, noise=1e-5), believed) for arm in arms
+    )
+    assert balanced.misfit == ''
+    assert unbalanced.misfit != ''
+
+
+def test_more_joints_leave_the_last_two_as_they_are():
+    count = 2
+    first = {
+        'link_length': [0.2] * count,
+        'link_com': [0.1] * count,
+        'link_mass': [0.3] * count,
+        'link_inertia': [1e-3] * count,
+        'tip_mass': 0.1,
+    }
+    believed = PlanarArm.reduced(
+        inertia_star=(6.4e-4, 1.5e-4), stiffness=9e-3, damping=6e-5, **first
+    )
+    true = PlanarArm.reduced(
+        inertia_star=(7.2e-4, 1.3e-4),
+        stiffness=8e-3,
+        damping=8e-5,
+        viscous_friction=[1e-3] * count + [2e-4],
+        coulomb_friction=[1e-3] * count + [5e-4],
+        **first,
+    )
+    fit = fit_model(recorded(true, believed, noise=1e-5), believed)
+    assert six(fit.arm) == pytest.approx(six(true), rel=0.01)
+
+
+def test_what_tells_nothing_is_refused():
+    seen = recorded(TRUE, BELIEVED, until=1.0)
+    with pytest.raises(InvalidRequest, match='3 joints'):
+        fit_model(
+            Measurements(
+                times=seen.times,
+                positions=np.zeros((seen.times.size, 3)),
+                efforts=np.zeros((seen.times.size, 2)),
+            ),
+            BELIEVED,
+        )
+    with pytest.raises(InvalidRequest, match='fewest'):
+        Measurements(times=seen.times[:9], positions=seen.positions[:9], efforts=seen.efforts[:9])
+    with pytest.raises(InvalidRequest, match='increase'):
+        Measurements(times=seen.times[::-1], positions=seen.positions, efforts=seen.efforts)

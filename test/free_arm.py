@@ -1,0 +1,49 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An arm of two joints with any spring, integrated by SciPy: no formula of the package in it."""
+
+from flat_planner_ros.core.model_fit import Measurements
+import numpy as np
+from scipy.integrate import solve_ivp
+
+
+def simulated(effort, times, *, both, last, spring, viscous=0.0, start=(0.0, 0.0, 0.0, 0.0)):
+    """
+    Return the angles of both joints, shape (m, 2) [rad].
+
+    The arm starts at the angles and rates given, the effort is a function of time [s], the spring
+    one of angle and rate of the passive joint.
+    """
+
+    def rates(t, x):
+        pull = spring(x[1], x[3])
+        mass = np.array([[both, last], [last, last]])
+        return [x[2], x[3], *np.linalg.solve(mass, [effort(t) - viscous * x[2], -pull])]
+
+    return solve_ivp(rates, (0.0, times[-1]), start, t_eval=times, rtol=1e-9, atol=1e-10).y[:2].T
+
+
+def measured(effort, times, *, noise=0.0, seed=0, **arm):
+    """Return what sensors show of the arm, with white noise [rad]."""
+    angles = simulated(effort, times, **arm)
+    angles = angles + noise * np.random.default_rng(seed).standard_normal(angles.shape)
+    return Measurements(times=times, positions=angles, efforts=effort(times)[:, None])
+
+
+def pushes(t):
+    """Return smooth pushes back and forth of up to 10 mN m over six seconds [N m]."""
+    inside = np.clip(np.mod(t, 1.5), 0.0, 1.0)
+    sign = np.where(np.mod(t, 3.0) < 1.5, 1.0, -1.0)
+    return 0.01 * sign * np.sin(2 * np.pi * inside) * np.sin(np.pi * inside) ** 2

@@ -1,0 +1,58 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Recordings of simulated arms: goals planned with one arm, played by another, seen by sensors."""
+
+from math import pi
+
+from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
+from flat_planner_ros.core.plant import EffortProfile, SimulatedArm
+import numpy as np
+
+GOALS = (pi, 0.0, 0.5 * pi, -0.5 * pi)
+"""Four ordinary goals of joint n-1 [rad]; the joints before it go to a half and a third of it."""
+
+
+def commanded(arm, goals=GOALS, spacing=1.5, duration=1.0, period=0.005):
+    """Return the efforts that bring an arm from goal to goal, as one command."""
+    shares = np.append(1.0 / np.arange(arm.n, 1, -1), 0.0)
+    shares[-2] = 1.0
+    times, efforts, here = [], [], np.zeros(arm.n)
+    for index, goal in enumerate(goals):
+        there = goal * shares
+        request = MotionRequest(start=here, final=there, duration=duration)
+        samples = plan(request, arm, PlanningOptions()).sample(period)
+        times.append(samples.times + index * spacing + 0.1)
+        efforts.append(samples.efforts[:, :-1])
+        here = there
+    return EffortProfile(start=0.0, times=np.concatenate(times), efforts=np.concatenate(efforts))
+
+
+def recorded(true, believed, *, rate=200.0, until=6.2, noise=0.0, step=0.0, seed=0, **command):
+    """Return what the sensors show: angles with noise [rad], then rounded to steps [rad]."""
+    profile = commanded(believed, **command)
+    simulated = SimulatedArm(true)
+    simulated.command(profile, 0.0)
+    times = np.arange(0.0, until, 1.0 / rate)
+    positions, efforts = [], []
+    for time in times:
+        simulated.advance(time)
+        positions.append(simulated.position)
+        efforts.append(profile.effort(time))
+    random = np.random.default_rng(seed)
+    angles = np.array(positions) + noise * random.standard_normal((times.size, true.n))
+    if step:
+        angles = step * np.round(angles / step)
+    return Measurements(times=times, positions=angles, efforts=np.array(efforts))
