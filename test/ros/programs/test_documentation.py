@@ -19,10 +19,12 @@ import re
 import subprocess
 import sys
 
+from flat_planner_ros import core
 from flat_planner_ros.ros.wire import interfaces
 import pytest
 
 DOCS = Path(__file__).resolve().parents[3] / 'docs'
+CORE = Path(core.__file__).parent
 TEXT = (DOCS / 'interfaces.md').read_text('utf-8')
 TOPICS = sorted(
     value
@@ -44,6 +46,24 @@ def test_a_topic_or_service_is_documented(topic):
 @pytest.mark.parametrize('reason', interfaces.ERROR_CODES, ids=lambda reason: reason.name)
 def test_an_error_code_is_documented(reason):
     assert f'| {interfaces.ERROR_CODES[reason]} | `{reason.value}` |' in TEXT
+
+
+def named_in_the_notation() -> list[str]:
+    """Return the dotted code names in the tables that begin with a wing or a module."""
+    homes = {path.stem for path in CORE.rglob('*.py')} | {path.name for path in CORE.iterdir()}
+    lines = (DOCS / 'notation.md').read_text('utf-8').splitlines()
+    cells = [line.split(' | ')[1] for line in lines if line.startswith('| ') and ' | ' in line[2:]]
+    names = [name for cell in cells for name in re.findall(r'`([\w.]+)[`\[]', cell)]
+    return sorted({name for name in names if name.count('.') and name.split('.')[0] in homes})
+
+
+@pytest.mark.parametrize('name', named_in_the_notation())
+def test_a_name_in_the_notation_is_in_the_code(name):
+    home, *rest = name.split('.')
+    sources = [*CORE.glob(f'{home}/*.py'), *CORE.glob(f'*/{home}.py')]
+    text = '\n'.join(path.read_text('utf-8') for path in sources)
+    for part in rest:
+        assert re.search(rf'\b(def|class) {part}\b|^\s*(self\.)?{part}\b.*[:=]', text, re.M), part
 
 
 def test_the_derivation_lists_its_sections():
