@@ -20,24 +20,11 @@ from collections import Counter
 from pathlib import Path
 from time import monotonic, time
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros.wire import interfaces
 import numpy as np
 from rclpy.qos import QoSProfile
 from ros.conftest import Graph
 from ros.relay import Faults, Relay
-from ros.world import (
-    answers,
-    COMMAND,
-    EVERY_VERDICT,
-    goal,
-    LATE,
-    NODES,
-    REPORT,
-    stamp,
-    STATUS,
-    values,
-)
+from ros.rig import COMMAND, goal, LATE, NODES, Rig, stamp, values
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -75,7 +62,7 @@ MEMORY_PERIOD = 2.0
 """Time between two looks at the memory of the nodes [s]."""
 
 
-class Rig:
+class Soak(Rig):
     """
     Three nodes of one arm and what is done to them.
 
@@ -103,7 +90,8 @@ class Rig:
 
     def __init__(self, graph: Graph, file: str, speed: float | None, seed: int) -> None:
         """Start the nodes."""
-        self.graph, self.speed = graph, speed
+        super().__init__(graph)
+        self.speed = speed
         self.random = np.random.default_rng(seed)
         self.counts: Counter[str] = Counter()
         self.failures: list[str] = []
@@ -135,8 +123,8 @@ class Rig:
         )
         self.state: JointState | None = None
         graph.probe.create_subscription(JointState, '/joint_states', self._on_state, NEWEST)
-        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT, matched=False)
-        self.reports = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED, matched=False)
+        self.hear_planner(matched=False)
+        self.hear_monitor(matched=False)
         self.processes = {}
         for name in NODES:
             self.start(name)
@@ -223,7 +211,7 @@ class Rig:
         self._expect(lambda: self.goals.is_idle and self.commands.is_idle, 'idle relays')
         delivered = len(self.goals.delivered)
         self._expect(lambda: self._answered() >= delivered, 'all verdicts')
-        accepted = [v for v in answers(self.status) if v['state'] == 'ACCEPTED']
+        accepted = [v for v in self.answers() if v['state'] == 'ACCEPTED']
         self.counts['goals'] += len(self.goals.received)
         self.counts['goals lost or doubled'] += abs(delivered - len(self.goals.received))
         self.counts['goals arrived'] += delivered
@@ -299,11 +287,11 @@ class Rig:
             self._expect(lambda: self.goals.is_idle, 'an idle relay')
             if len(self.goals.delivered) > delivered:
                 self._expect(lambda: self._answered() >= len(self.goals.delivered), 'a verdict')
-                accepted = [v for v in answers(self.status) if v['state'] == 'ACCEPTED']
+                accepted = [v for v in self.answers() if v['state'] == 'ACCEPTED']
                 if accepted:
                     return accepted[-1]
                 self._wait(0.3)
-        raise AssertionError('no goal is accepted: ' + answers(self.status)[-1]['error_name'])
+        raise AssertionError('no goal is accepted: ' + self.answers()[-1]['error_name'])
 
     def _all(self) -> list[dict[str, str]]:
         """Return the values of all statuses."""
@@ -311,7 +299,7 @@ class Rig:
 
     def _answered(self) -> int:
         """Return the number of verdicts on goals."""
-        return len(answers(self.status))
+        return len(self.answers())
 
     def _ended(self, verdict: dict[str, str]) -> list[dict[str, str]]:
         """Return how an accepted goal has ended."""

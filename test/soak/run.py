@@ -32,7 +32,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from ros.conftest import free_domain, Graph  # noqa: E402  From the directory of tests.
-from soak.rig import Rig  # noqa: E402
+from soak.rig import Soak  # noqa: E402
 
 RIGS = {
     '2-DOF, 2 x real time': ('arm_2dof.yaml', 2.0),
@@ -65,7 +65,7 @@ def run_rig(name: str, minutes: float, seed: int) -> None:
     with free_domain() as domain:
         graph = Graph(domain)
         try:
-            rig = Rig(graph, file, speed, seed)
+            rig = Soak(graph, file, speed, seed)
             rig.run(60.0 * minutes)
             failures = list(rig.failures)
             seconds = rig.counts['seconds']

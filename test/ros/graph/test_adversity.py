@@ -24,7 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
-from ros.world import ANSWERS, GOAL, goal, NODES, stamp, START_DELAY, values, World
+from ros.rig import ANSWERS, GOAL, goal, NODES, stamp, START_DELAY, values, World
 from rosgraph_msgs.msg import Clock
 from trajectory_msgs.msg import JointTrajectory
 
@@ -187,7 +187,7 @@ def test_a_clock_that_stops_stops_the_motion_and_ends_it_when_it_goes_on(graph):
     assert world.states[-1].effort[0] != 0.0
     graph.expect(lambda: len(health) >= 3, 'two seconds')
     assert len(world.states) == count, 'the arm stands still'
-    assert world.ask(2.0, 1.0)['state'] in ANSWERS
+    assert world.send(2.0, 1.0)['state'] in ANSWERS
     run(float(world.answers()[-1]['start_time']) + 1.0 + 4.0)
     assert world.states[-1].position[0] == pytest.approx(2.0, abs=1e-3)
     last = values(world.reports[-1])

@@ -28,7 +28,7 @@ from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
-from ros.world import goal
+from ros.rig import goal
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 from trajectory_controller import broken, Controller, PRECAUTIONS, REFUSALS

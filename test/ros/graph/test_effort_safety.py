@@ -14,30 +14,27 @@
 
 """Nothing moves by itself: not after a restart, not from an old, late or foreign command."""
 
-from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
-from ros.world import ask, COMMAND, EVERY_VERDICT, goal, move, Observer, stamp, START_DELAY, STATUS
-from sensor_msgs.msg import JointState
+from ros.rig import COMMAND, PLAN, Rig, stamp, START_DELAY
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-PLAN = '/flat_planner/plan'
 
 DURATION = 9.0
 """Of a motion [s]: long enough to restart a process in the middle of it."""
 
 
-class Watched(Observer):
+class Watched(Rig):
     """A planner in the test and a plant in a process of its own, both watched."""
 
     def __init__(self, graph, *arguments):
         """Start both and wait for the first joint state."""
-        self.graph, self.arguments = graph, arguments
-        self.states = graph.collect(JointState, 'joint_states', matched=False)
+        super().__init__(graph)
+        self.arguments = arguments
+        self.hear_plant(matched=False)
         self.planner = graph.create(PlannerNode, {'start_delay': START_DELAY})
-        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT)
+        self.hear_planner()
         self.start()
 
     def start(self):
@@ -58,7 +55,7 @@ class Watched(Observer):
     def move(self, position: float, duration: float = DURATION) -> JointTrajectory:
         """Send a goal until it is accepted; return its plan."""
         plans = self.graph.collect(JointTrajectory, PLAN)
-        move(self.graph, self.status, goal(position, duration))
+        super().move(position, duration)
         self.graph.expect(lambda: plans, 'the plan')
         return plans[0]
 
@@ -69,10 +66,6 @@ class Watched(Observer):
             if self.graph.spin_until(lambda: self.states[-1].position[0] > 0.49, 5.0):
                 return
         pytest.fail('no motion is played')
-
-    def efforts(self) -> np.ndarray:
-        """Return the efforts of joint 1 since the last restart [N m]."""
-        return np.array([state.effort[0] for state in self.states])
 
 
 def test_a_plant_that_was_killed_in_a_motion_does_not_take_it_up_again(graph):
@@ -99,7 +92,7 @@ def test_no_motion_takes_over_where_a_restarted_plant_stands_still(graph):
     watched.start()
     new = stamp(watched.states[0])
     graph.expect(lambda: watched.planner._session.measured.time > new, 'a state of it there')
-    verdict = ask(graph, watched.status, goal(1.0, 1.0))
+    verdict = watched.send(1.0, 1.0)
     assert watched.planner._session.measured.time < end, 'within the motion'
     assert verdict['error_name'] == 'START_STATE_MISMATCH', verdict
     assert float(verdict['limit']) == 0.5

@@ -24,13 +24,12 @@ from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
-from ros.world import ask, COMMAND, goal, REPORT, stamp, STATUS, values
+from ros.rig import COMMAND, GOAL, goal, Rig, stamp, STATES, STATUS, values
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-STATES, GOAL = '/joint_states', '/flat_planner/goal'
 SIMULATED = {'use_sim_time': True}
 
 
@@ -46,15 +45,16 @@ def errors(graph, text):
     return {e.name for e in graph.log if e.level >= Log.ERROR and text in e.msg}
 
 
-class Timed:
+class Timed(Rig):
     """Nodes that follow a clock of the test."""
 
     def __init__(self, graph, *classes):
         """Start them."""
-        self.graph, self.time = graph, 0.0
-        self.states = graph.collect(JointState, STATES, matched=False)
-        self.statuses = graph.collect(DiagnosticArray, STATUS, 100, matched=False)
-        self.reports = graph.collect(DiagnosticArray, REPORT, 100, matched=False)
+        super().__init__(graph)
+        self.time = 0.0
+        self.hear_plant(matched=False)
+        self.hear_planner(matched=False)
+        self.hear_monitor(matched=False)
         self.plant, *_ = (graph.create(node_class, SIMULATED) for node_class in classes)
         self.count = len(classes)
 
@@ -75,7 +75,7 @@ class Timed:
 
     def move(self, position):
         """Send a goal; return its verdict."""
-        verdict = ask(self.graph, self.statuses, goal(position))
+        verdict = self.send(position)
         if verdict['state'] == 'ACCEPTED':
             start = float(verdict['start_time'])
             self.graph.expect(

@@ -16,7 +16,7 @@
 
 import numpy as np
 import pytest
-from ros.world import Late, NODES, stamp, World
+from ros.rig import Late, NODES, stamp, World
 
 
 def test_a_monitor_killed_in_a_motion_reports_it_after_its_restart(graph):
@@ -56,9 +56,9 @@ def test_a_planner_restarted_in_a_motion_waits_for_its_end(graph):
         world.wait_until(world.begin + 2.0)
         world.kill('planner_node')
         world.start('planner_node')
-        verdict = world.ask(0.0)
+        verdict = world.send(0.0)
         while verdict['error_name'].startswith('START_STATE'):
-            verdict = world.ask(0.0)
+            verdict = world.send(0.0)
         if abs(world.states[-1].velocity[0]) < 0.15:
             raise Late('the restart took all of the motion')
         assert verdict['error_name'] == 'NOT_AT_REST'

@@ -17,41 +17,27 @@
 import json
 from math import pi
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.ros.wire import interfaces, stamps
+from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
 from ros.relay import Faults, Relay
-from ros.world import (
-    answers,
-    EVERY_VERDICT,
-    goal,
-    move,
-    not_verified,
-    Observer,
-    stamp,
-    STATUS,
-    values,
-)
+from ros.rig import COMMAND, GOAL, goal, not_verified, stamp, STATES, values, World
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-GOAL, COMMAND, STATES = '/flat_planner/goal', '/flat_planner/joint_trajectory', '/joint_states'
 BAD = Faults(loss=0.2, duplication=0.3, reordering=0.3, delay=(0.0, 0.2))
 DELAYS = ((0.19, 0.2), (0.0, 0.02), (0.0, 0.2))
 """Of a command [s]; a motion starts 0.05 s after its verdict."""
 
 REFUSED, LATE = 'trajectory ignored', 'ms after its start'
-SAMPLES = interfaces.QoSProfile(depth=1000)
 
 
-class Lossy(Observer):
+class Lossy(World):
     """The three nodes, what the plant hears or says through a relay."""
 
     def __init__(self, graph, *, source, target, kind, remap='', seed=1, **plant):
         """Start them; `remap` puts a node at the other end of the relay."""
-        self.graph = graph
         parameters = {
             'flat_planner:use_sim_time': True,
             'flat_monitor:use_sim_time': True,
@@ -67,24 +53,19 @@ class Lossy(Observer):
         arguments = [
             word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')
         ]
-        graph.start('demo', '--ros-args', *arguments, *(['-r', remap] if remap else []))
+        arguments += ['-r', remap] if remap else []
+        super().__init__(graph, arguments=arguments, delay=None)
         self.relay = graph.add(
             Relay(
                 kind, source, target, seed=seed, context=graph.context, use_global_arguments=False
             )
         )
-        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT)
-        self.reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
-        truth = '/true_states' if kind is JointState else STATES
-        self.states = graph.collect(JointState, truth, SAMPLES)
+        if kind is JointState:
+            self.states = self.hear(JointState, source)
         graph.expect(self.relay.target.get_subscription_count, 'a reader of the relay')
         if source != '/goals':  # that one the test publishes
             graph.expect(self.relay.source.get_publisher_count, 'a source of the relay')
         graph.expect(lambda: self.states, 'joint states')
-
-    def send(self, position, duration=0.8):
-        """Send a goal until it is accepted: joint states may be too old; return its verdict."""
-        return move(self.graph, self.status, goal(position, duration))
 
     def between(self, start, end):
         """Return times, last joint's angles and first joint's efforts of a time [s]."""
@@ -127,8 +108,8 @@ def test_every_goal_that_arrives_gets_one_verdict_in_the_order_of_arrival(graph)
     assert set(arrived) < set(sent), 'some were lost'
     assert arrived != sorted(arrived), 'some came out of order'
     graph.publish('/goals', JointTrajectory())  # its verdict is the last one
-    graph.expect(lambda: len(answers(lossy.status)) > len(arrived), 'all verdicts')
-    *verdicts, last = answers(lossy.status)
+    graph.expect(lambda: len(lossy.answers()) > len(arrived), 'all verdicts')
+    *verdicts, last = lossy.answers()
     assert last['error_name'] == 'EMPTY_GOAL'
     assert [json.loads(v['goal.positions'])[0] for v in verdicts] == pytest.approx(arrived)
     moving = [v for m, v in zip(relay.delivered, verdicts, strict=False) if m.points[0].velocities]
@@ -153,7 +134,7 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
         lossy.relay.faults = Faults(loss=0.2, duplication=0.5, delay=DELAYS[len(kinds) % 3])
         del lossy.reports[:], lossy.relay.delivered[:], lossy.relay.received[:]
         refusals, delays = (len(graph.logged(text)) for text in (REFUSED, LATE))
-        verdict = lossy.send(pi)
+        verdict = lossy.move(pi, 0.8)
         start = float(verdict['start_time'])
         end = start + float(verdict['duration'])
         graph.expect(lambda: lossy.reports, 'a report')
@@ -187,13 +168,13 @@ def test_a_command_that_was_overtaken_does_not_take_over_again(graph):
         # The third command goes on from the second, which the plant has not heard of yet.
         start_tolerance=10.0,
     )
-    first = lossy.send(2.0, 2.0)
+    first = lossy.move(2.0, 2.0)
     lossy.wait_until(float(first['start_time']) + 0.3)
     lossy.relay.faults = Faults(reordering=1.0)
-    lossy.send(1.0, 1.0)
+    lossy.move(1.0, 1.0)
     graph.expect(lambda: not lossy.relay.is_idle, 'the second command, held back')
     lossy.wait_until(stamp(lossy.states[-1]) + 0.05)
-    last = lossy.send(3.0, 1.5)
+    last = lossy.move(3.0, 1.5)
     graph.expect(lambda: len(lossy.relay.delivered) == 3, 'the second command after the third')
     delivered = [m.points[-1].positions[0] for m in lossy.relay.delivered]
     assert delivered == pytest.approx([2.0, 3.0, 1.0])
@@ -220,7 +201,7 @@ def test_residuals_are_reported_honestly_from_joint_states_that_come_badly(graph
         del lossy.reports[:]
         heard = len(lossy.relay.delivered)
         graph.expect(lambda heard=heard: len(lossy.relay.delivered) > heard + 60, 'the reset')
-        verdict = lossy.send(position)
+        verdict = lossy.move(position, 0.8)
         end = float(verdict['start_time']) + float(verdict['duration'])
         graph.expect(lambda: lossy.reports, 'a report')
         _, angles, _ = lossy.between(end, end + 1.0)

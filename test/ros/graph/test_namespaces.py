@@ -19,7 +19,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from ros.conftest import TIMEOUT
-from ros.world import World
+from ros.rig import World
 
 ARMS = ('left', 'middle', 'right')
 

@@ -17,7 +17,7 @@
 from math import pi
 
 import pytest
-from ros.world import Suite, values
+from ros.rig import Suite, values
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -27,14 +27,14 @@ from trajectory_msgs.msg import JointTrajectory
 )
 def test_the_exact_map_leaves_nothing_with_damping(graph, strategy):
     suite = Suite(graph, planner={'strategy': strategy, 'flat_model': 'exact'})
-    _, report = suite.move(pi)
+    _, report = suite.carry_out(pi)
     assert float(report['amplitude']) < 1e-5
     assert float(report['final_error.joint1']) == pytest.approx(0.0, abs=1e-5)
 
 
 def test_the_papers_map_leaves_what_the_paper_found(graph):
     suite = Suite(graph, planner={'strategy': 'polynomial', 'flat_model': 'approximate'})
-    _, report = suite.move(pi)
+    _, report = suite.carry_out(pi)
     assert float(report['amplitude']) == pytest.approx(0.00449, rel=0.02)
 
 
@@ -42,7 +42,7 @@ def test_without_damping_nothing_is_left(graph):
     undamped = {'model.inertia_star': [6.4e-4, 3.3e-5], 'model.stiffness': 3e-3}
     undamped |= {'model.damping': 0.0, 'joints': ['joint1', 'joint2']}
     suite = Suite(graph, planner=undamped, plant=undamped)
-    verdict, report = suite.move(pi)
+    verdict, report = suite.carry_out(pi)
     assert float(report['amplitude']) < 2e-5
     assert float(report['final_error.joint1']) == pytest.approx(0.0, abs=2e-4)
     assert float(report['rms_effort.joint1']) == pytest.approx(
@@ -56,7 +56,7 @@ def test_without_damping_nothing_is_left(graph):
 def test_a_mismatch_is_seen_and_its_frequency_is_measured(graph):
     mismatch = {'mismatch.stiffness_scale': 1.1, 'mismatch.damping_scale': 1.1}
     suite = Suite(graph, planner={'flat_model': 'approximate'}, plant=mismatch)
-    _, report = suite.move(pi)
+    _, report = suite.carry_out(pi)
     assert float(report['amplitude']) == pytest.approx(0.0758, rel=0.02)
     # The plant's own frequency, not the one that the model expects.
     ratio = float(report['frequency']) / float(report['frequency_expected'])
@@ -68,8 +68,8 @@ def test_a_mismatch_is_seen_and_its_frequency_is_measured(graph):
 def test_two_motions_give_two_reports_and_each_starts_where_the_last_ended(graph):
     approximate = {'strategy': 'min_potential_energy', 'flat_model': 'approximate'}
     suite = Suite(graph, planner=approximate)
-    suite.move(1.0)
-    _, second = suite.move(-0.5)
+    suite.carry_out(1.0)
+    _, second = suite.carry_out(-0.5)
     assert len(suite.reports) == 2
     assert suite.plans[1].points[0].positions[0] == pytest.approx(1.0, abs=0.01)
     # What the first motion left, 0.95e-3 rad, has decayed to a third and adds to it.
@@ -91,7 +91,7 @@ def test_a_rejected_goal_disturbs_no_motion(graph):
 
 def test_replan_repeats_the_last_goal(graph):
     suite = Suite(graph)
-    suite.move(0.5)
+    suite.carry_out(0.5)
     graph.call(Trigger, '/flat_plant/reset')
     graph.expect(lambda: suite.states[-1].position[0] == 0.0, 'the reset')
 

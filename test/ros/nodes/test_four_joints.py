@@ -19,7 +19,7 @@ from pathlib import Path
 from flat_planner_ros.ros.wire import interfaces
 import numpy as np
 import pytest
-from ros.world import Suite, values
+from ros.rig import Suite, values
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -38,7 +38,7 @@ class Arm(Suite):
 
     def report(self, angles, duration=1.5):
         """Carry a goal out; return the values of the report on its motion."""
-        return self.move(angles, duration)[1]
+        return self.carry_out(angles, duration)[1]
 
     def send_and_wait(self, angles, elapsed):
         """Send a goal; wait for a time within its motion."""
@@ -101,7 +101,7 @@ def test_new_goals_and_a_stop_in_motion_leave_the_vertical_arm_at_rest(graph):
 def test_the_command_of_an_arm_with_weight_holds_it_at_its_ends(graph):
     arm = Arm(graph, 'arm_4dof.yaml')
     plans = graph.collect(JointTrajectory, '/flat_planner/flat_plan', interfaces.LATCHED)
-    arm.move([1.0, 0.1, 0.2])
+    arm.carry_out([1.0, 0.1, 0.2])
     command, flat = arm.commands[-1], plans[-1]
     assert command.joint_names == ['joint1', 'joint2', 'joint3', 'joint4']
     first, last = command.points[0], command.points[-1]

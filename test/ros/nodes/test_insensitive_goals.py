@@ -17,35 +17,26 @@
 from math import pi
 
 from core.conftest import ARM, envelope
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from flat_planner_ros.core import EffortProfile, FlatPlannerError, rollout
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.wire import interfaces
 import numpy as np
 import pytest
-from ros.world import ask, goal, STATUS
-from trajectory_msgs.msg import JointTrajectory
+from ros.rig import Planner
 
 REST = {'start.source': 'parameter', 'start.position': [0.0, 0.0], 'execute': False}
 
 
-class Planner:
-    """A planner that starts from given rest, and what it says."""
+class Resting(Planner):
+    """A planner that starts from given rest."""
 
     def __init__(self, graph, **parameters):
         """Start it."""
-        self.graph = graph
-        graph.create(PlannerNode, {**REST, **parameters})
-        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
-        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
+        super().__init__(graph, {**REST, **parameters})
 
     def send(self, angle=pi, duration=1.0):
-        """Send a goal for joint 1 and return the values of its verdict."""
-        before = len(self.status)
-        verdict = ask(self.graph, self.status, goal(angle, duration))
-        status = self.status[before].status[0]
-        self.level = status.level
-        return {**verdict, 'message': status.message}
+        """Send a goal for joint 1; return its verdict."""
+        return super().send(angle, duration)
 
     def command(self):
         """Return the points of the last plan."""
@@ -65,7 +56,7 @@ def simulated_amplitude(points, factor):
 
 @pytest.mark.parametrize('nominal', ['exact', 'free'])
 def test_scenario_3_on_either_side(graph, nominal):
-    planner = Planner(graph, strategy='insensitive', **{'insensitivity.nominal': nominal})
+    planner = Resting(graph, strategy='insensitive', **{'insensitivity.nominal': nominal})
     verdict = planner.send()
     assert verdict['state'] == 'ACCEPTED', verdict['message']
     left = {f: simulated_amplitude(planner.command(), f) for f in (0.9, 1.0, 1.1)}
@@ -79,7 +70,7 @@ def test_scenario_3_on_either_side(graph, nominal):
 
 
 def test_every_verdict_predicts_and_may_advise(graph):
-    planner = Planner(graph, strategy='min_potential_energy')
+    planner = Resting(graph, strategy='min_potential_energy')
     verdict = planner.send()
     assert float(verdict['predicted_residual']) < 1e-6
     assert float(verdict['predicted_residual_worst']) == pytest.approx(0.0841, abs=1e-4)
@@ -98,7 +89,7 @@ def test_every_verdict_predicts_and_may_advise(graph):
 
 
 def test_bounds_are_kept_or_the_goal_is_rejected(graph):
-    planner = Planner(graph, strategy='insensitive', **{'insensitivity.max_residual': 0.02})
+    planner = Resting(graph, strategy='insensitive', **{'insensitivity.max_residual': 0.02})
     assert float(planner.send()['predicted_residual_worst']) <= 0.0201
     verdict = planner.send(duration=0.25)
     assert verdict['error_name'] == 'SOLVER_FAILED'
@@ -107,12 +98,12 @@ def test_bounds_are_kept_or_the_goal_is_rejected(graph):
 
 
 def test_a_start_in_motion_says_what_is_planned_instead(graph):
-    planner = Planner(graph, strategy='insensitive', execute=True, **{'replan.lookahead': 1.0})
+    planner = Resting(graph, strategy='insensitive', execute=True, **{'replan.lookahead': 1.0})
     verdict = planner.send(duration=4.0)
-    assert planner.level == DiagnosticStatus.OK
+    assert verdict['level'] == DiagnosticStatus.OK
     assert verdict['strategy'] == 'insensitive'
     verdict = planner.send(angle=1.0, duration=4.0)
-    assert planner.level == DiagnosticStatus.WARN
+    assert verdict['level'] == DiagnosticStatus.WARN
     assert verdict['strategy'] == 'polynomial'
     assert verdict['message'].startswith('plan 2: polynomial, 4 s')
     assert 'not insensitive, which only plans from rest' in verdict['message']
@@ -130,7 +121,7 @@ def test_a_start_in_motion_says_what_is_planned_instead(graph):
 )
 def test_settings_that_make_no_sense_are_refused(graph, changes, reason):
     parameters = {'strategy': 'insensitive', 'insensitivity.weight': 100.0}
-    Planner(graph, **parameters)
+    Resting(graph, **parameters)
     (result,) = graph.set_parameters('flat_planner', **changes)
     assert not result.successful
     assert reason in result.reason or 'range' in result.reason
@@ -143,7 +134,7 @@ def test_an_arm_that_does_not_oscillate_has_no_predicted_residual(graph):
         'model.stiffness': 3.0e-3,
         'model.damping': 2.0e-3,
     }
-    verdict = Planner(graph, **model).send()
+    verdict = Resting(graph, **model).send()
     assert verdict['state'] == 'ACCEPTED'
     assert 'predicted_residual' not in verdict
     with pytest.raises(FlatPlannerError, match='does not oscillate'):

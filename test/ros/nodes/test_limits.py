@@ -16,15 +16,13 @@
 
 from math import inf, pi
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.ros.nodes.planner_node import PlannerNode
-from flat_planner_ros.ros.wire import interfaces, stamps
+from diagnostic_msgs.msg import DiagnosticStatus
+from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
-from ros.world import goal, STATUS, table, values
+from ros.rig import Planner, table
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
 
 EFFORT, VELOCITY = 0.015, 7.0
 """Limits of joint 1 [N m, rad/s]."""
@@ -41,30 +39,17 @@ DURATION_MIN = 1.0041
 """Shortest half turn of the polynomial law within both limits, to 0.1 % [s]."""
 
 
-class Planner:
-    """A planner node with limits, whose arm rests at 0."""
+class Limited(Planner):
+    """A planner with limits, whose arm rests at 0."""
 
     def __init__(self, graph, **parameters):
         """Start it and let it see the arm."""
-        self.graph = graph
-        self.node = graph.create(PlannerNode, {**LIMITED, **parameters})
-        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
-        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
-        state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
-        state.header.stamp = self.node.get_clock().now().to_msg()
-        graph.publish('joint_states', state)
-        graph.expect(lambda: self.node._session.measured is not None, 'the measured state')
+        super().__init__(graph, {**LIMITED, **parameters})
+        self.measure()
 
     def send(self, angle=pi, duration=0.0):
-        """Send a goal and return the verdict and its values."""
-        return self.verdict('goal', goal(angle, duration))
-
-    def verdict(self, topic, message):
-        """Return the answer to a message."""
-        before = len(self.status)
-        self.graph.publish(f'/flat_planner/{topic}', message)
-        self.graph.expect(lambda: len(self.status) > before, 'a verdict')
-        return self.status[before].status[0], values(self.status[before])
+        """Send a goal; return its verdict."""
+        return super().send(angle, duration)
 
     def exact_plan(self):
         """Return the continuous plan that was accepted last, sampled 100 001 times."""
@@ -83,90 +68,90 @@ def assert_obeys(planner):
 
 
 def test_a_motion_too_fast_is_refused_with_numbers_that_can_be_used(graph):
-    planner = Planner(graph)
-    status, values = planner.send(duration=0.8)
-    assert status.level == DiagnosticStatus.ERROR
-    assert (values['state'], values['error_name']) == ('REJECTED', 'EFFORT_LIMIT')
-    assert values['error_code'] == '-112'
-    assert values['joint'] == 'joint1'
-    assert abs(float(values['value'])) > EFFORT
-    assert abs(float(values['limit'])) == EFFORT
-    assert 0.0 < float(values['time']) < 0.8
-    assert float(values['duration_min']) == pytest.approx(DURATION_MIN, rel=1e-3)
-    assert f'shortest feasible duration is {values["duration_min"]} s' in status.message
+    planner = Limited(graph)
+    verdict = planner.send(duration=0.8)
+    assert verdict['level'] == DiagnosticStatus.ERROR
+    assert (verdict['state'], verdict['error_name']) == ('REJECTED', 'EFFORT_LIMIT')
+    assert verdict['error_code'] == '-112'
+    assert verdict['joint'] == 'joint1'
+    assert abs(float(verdict['value'])) > EFFORT
+    assert abs(float(verdict['limit'])) == EFFORT
+    assert 0.0 < float(verdict['time']) < 0.8
+    assert float(verdict['duration_min']) == pytest.approx(DURATION_MIN, rel=1e-3)
+    assert f'shortest feasible duration is {verdict["duration_min"]} s' in verdict['message']
     assert not planner.plans
-    status, values = planner.send(duration=float(values['duration_min']))
-    assert (values['state'], status.level) == ('ACCEPTED', DiagnosticStatus.OK)
-    assert 'duration_min' not in values
+    verdict = planner.send(duration=float(verdict['duration_min']))
+    assert (verdict['state'], verdict['level']) == ('ACCEPTED', DiagnosticStatus.OK)
+    assert 'duration_min' not in verdict
     graph.expect(lambda: planner.plans, 'the plan')
     assert_obeys(planner)
 
 
 def test_a_velocity_limit_has_its_own_code(graph):
-    planner = Planner(graph, **{'limits.velocity': [4.5, inf]})
-    status, values = planner.send(duration=1.1)
-    assert (values['error_name'], values['error_code']) == ('VELOCITY_LIMIT', '-111')
-    assert 'rad/s' in status.message
+    planner = Limited(graph, **{'limits.velocity': [4.5, inf]})
+    verdict = planner.send(duration=1.1)
+    assert (verdict['error_name'], verdict['error_code']) == ('VELOCITY_LIMIT', '-111')
+    assert 'rad/s' in verdict['message']
 
 
 def test_a_final_pose_out_of_range_is_refused_at_once(graph):
-    planner = Planner(graph, **{'limits.position_max': [3.0, 1.0]})
+    planner = Limited(graph, **{'limits.position_max': [3.0, 1.0]})
     for duration in (0.0, 2.0):
-        status, values = planner.send(duration=duration)
-        assert (values['error_name'], values['error_code']) == ('POSITION_LIMIT', '-110')
-        assert 'the final position 3.14159 rad of joint1' in status.message
-        assert 'duration_min' not in values
+        verdict = planner.send(duration=duration)
+        assert (verdict['error_name'], verdict['error_code']) == ('POSITION_LIMIT', '-110')
+        assert 'the final position 3.14159 rad of joint1' in verdict['message']
+        assert 'duration_min' not in verdict
 
 
 def test_a_motion_too_fast_is_stretched_with_a_warning(graph):
-    planner = Planner(graph, **{'limits.on_violation': 'scale'})
-    status, values = planner.send(duration=0.8)
-    assert status.level == DiagnosticStatus.WARN
-    assert values['state'] == 'ACCEPTED'
-    assert values['duration'] == values['duration_min']
-    assert float(values['duration']) == pytest.approx(DURATION_MIN, rel=1e-3)
-    assert values['joint'] == 'joint1'
-    assert abs(float(values['value'])) > abs(float(values['limit'])) == EFFORT
-    assert 'stretched' in status.message
+    planner = Limited(graph, **{'limits.on_violation': 'scale'})
+    verdict = planner.send(duration=0.8)
+    assert verdict['level'] == DiagnosticStatus.WARN
+    assert verdict['state'] == 'ACCEPTED'
+    assert verdict['duration'] == verdict['duration_min']
+    assert float(verdict['duration']) == pytest.approx(DURATION_MIN, rel=1e-3)
+    assert verdict['joint'] == 'joint1'
+    assert abs(float(verdict['value'])) > abs(float(verdict['limit'])) == EFFORT
+    assert 'stretched' in verdict['message']
     graph.expect(lambda: planner.plans, 'the plan')
     assert_obeys(planner)
-    status, values = planner.send(duration=2.0)
-    assert (status.level, values['duration']) == (DiagnosticStatus.OK, '2')
+    verdict = planner.send(duration=2.0)
+    assert (verdict['level'], verdict['duration']) == (DiagnosticStatus.OK, '2')
 
 
 def test_a_goal_without_times_takes_the_shortest_duration(graph):
-    planner = Planner(graph)
-    status, values = planner.send()
-    assert (values['state'], status.level) == ('ACCEPTED', DiagnosticStatus.OK)
-    assert values['duration'] == values['duration_min']
-    duration = float(values['duration'])
+    planner = Limited(graph)
+    verdict = planner.send()
+    assert (verdict['state'], verdict['level']) == ('ACCEPTED', DiagnosticStatus.OK)
+    assert verdict['duration'] == verdict['duration_min']
+    duration = float(verdict['duration'])
     assert duration == pytest.approx(DURATION_MIN, rel=1e-3)
     graph.expect(lambda: planner.plans, 'the plan')
     assert_obeys(planner)
     last = planner.plans[-1].points[-1].time_from_start
     assert stamps.seconds(last) == pytest.approx(duration, abs=1e-9)
-    status, values = planner.send(duration=duration * (1.0 - 1e-3))
-    assert values['error_name'] in ('EFFORT_LIMIT', 'VELOCITY_LIMIT')
+    verdict = planner.send(duration=duration * (1.0 - 1e-3))
+    assert verdict['error_name'] in ('EFFORT_LIMIT', 'VELOCITY_LIMIT')
     pose = JointState(name=['joint1'], position=[1.0])
-    status, values = planner.verdict('goal_state', pose)
-    assert values['state'] == 'ACCEPTED'
-    assert float(values['duration']) < duration
+    verdict = planner.ask(pose, '/flat_planner/goal_state')
+    assert verdict['state'] == 'ACCEPTED'
+    assert float(verdict['duration']) < duration
     graph.expect(lambda: len(planner.plans) == 2, 'the second plan')
     assert_obeys(planner)
 
 
 def test_without_limits_a_goal_without_times_is_told_what_to_set(graph):
-    planner = Planner(graph, **{'limits.effort': [inf, inf], 'limits.velocity': [inf, inf]})
-    status, values = planner.send()
-    assert values['error_name'] == 'DURATION_OUT_OF_RANGE'
+    planner = Limited(graph, **{'limits.effort': [inf, inf], 'limits.velocity': [inf, inf]})
+    verdict = planner.send()
+    assert verdict['error_name'] == 'DURATION_OUT_OF_RANGE'
     for name in ('time_from_start', 'duration.default', 'limits.velocity', 'limits.effort'):
-        assert name in status.message
+        assert name in verdict['message']
 
 
 def test_limits_changed_at_run_time_hold_for_the_next_goal(graph):
-    planner = Planner(graph)
-    _, values = planner.send(duration=1.1)
-    assert values['state'] == 'ACCEPTED'
+    planner = Limited(graph)
+    verdict = planner.send(duration=1.1)
+    assert verdict['state'] == 'ACCEPTED'
     changes = {'limits.effort': [0.5 * EFFORT, inf], 'limits.on_violation': 'scale'}
     for result in graph.set_parameters('flat_planner', **changes):
         assert result.successful, result.reason

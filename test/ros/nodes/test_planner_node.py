@@ -20,11 +20,10 @@ import resource
 import signal
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
-from ros.world import ask, STATUS, table
+from ros.rig import Planner, Rig, table
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -33,49 +32,19 @@ GOAL = '/flat_planner/goal'
 PATIENT = {'start.joint_state_timeout': 60.0, 'start.source': 'measured'}
 
 
-class Planner:
-    """The node under test and everything that it says."""
+class Patient(Planner):
+    """A planner whose arm is measured once, and everything that it says."""
 
     def __init__(self, graph, parameters=None, *arguments):
-        """Start it, and stand for the arm at rest at 0."""
-        self.graph = graph
-        self.node = graph.create(PlannerNode, {**PATIENT, **(parameters or {})}, *arguments)
-        name = self.node.get_fully_qualified_name()
-        self.name = name
-        collect = graph.collect
-        self.status = collect(DiagnosticArray, f'{name}/status', interfaces.LATCHED_HISTORY)
-        self.plans = collect(JointTrajectory, f'{name}/plan', interfaces.LATCHED)
-        self.flat = collect(JointTrajectory, f'{name}/flat_plan', interfaces.LATCHED)
-        self.commands = collect(JointTrajectory, f'{name}/joint_trajectory')
-        self.references = collect(JointState, f'{name}/reference')
+        """Start it."""
+        super().__init__(graph, {**PATIENT, **(parameters or {})}, *arguments)
+        self.name = self.node.get_fully_qualified_name()
+        self.flat = self.hear(JointTrajectory, '/flat_planner/flat_plan', interfaces.LATCHED)
+        self.references = self.hear(JointState, '/flat_planner/reference')
 
-    def now(self) -> float:
-        """Return the time of the node [s]."""
-        return stamps.now(self.node.get_clock())
-
-    def measure(self, position=(0.0, 0.0), velocity=(0.0, 0.0), names=('joint1', 'joint2')):
-        """Publish a joint state and wait until the node has it."""
-        state = JointState(name=list(names), position=list(position), velocity=list(velocity))
-        state.header.stamp = stamps.time_msg(self.now())
-        self.graph.publish('joint_states', state)
-        stamp = stamps.seconds(state.header.stamp)
-
-        def has_arrived() -> bool:
-            sample = self.node._session.measured
-            return sample is not None and sample.time == stamp
-
-        self.graph.expect(has_arrived, 'the measured state')
-
-    def verdicts(self) -> list[DiagnosticStatus]:
+    def statuses(self) -> list[DiagnosticStatus]:
         """Return all that was said of goals and motions."""
         return [array.status[0] for array in self.status]
-
-    def send(self, message, topic='goal') -> dict[str, str]:
-        """Send a goal and return the values of its verdict, with the message."""
-        before = len(self.status)
-        self.graph.publish(f'{self.name}/{topic}', message)
-        self.graph.expect(lambda: len(self.status) > before, 'a verdict')
-        return values(self.status[before].status[0])
 
 
 def values(status: DiagnosticStatus) -> dict[str, str]:
@@ -97,14 +66,14 @@ def goal(angle=pi, duration=1.0, stamp=0.0, **fields) -> JointTrajectory:
 @pytest.fixture
 def planner(graph):
     """Return a planner that has seen the arm at rest."""
-    result = Planner(graph)
+    result = Patient(graph)
     result.measure()
     return result
 
 
 def test_an_accepted_goal_becomes_a_command_that_an_executor_can_play(planner):
     sent_at = planner.now()
-    verdict = planner.send(goal())
+    verdict = planner.ask(goal())
     assert verdict['state'] == 'ACCEPTED'
     assert verdict['level'] == DiagnosticStatus.OK
     planner.graph.expect(lambda: planner.commands, 'the command')
@@ -133,10 +102,10 @@ def test_an_accepted_goal_becomes_a_command_that_an_executor_can_play(planner):
 
 
 def test_the_verdict_states_numbers_and_repeats_the_goal(planner):
-    planner.send(goal())
-    verdict = planner.send(goal(stamp=planner.now() - 100.0))
+    planner.ask(goal())
+    verdict = planner.ask(goal(stamp=planner.now() - 100.0))
     assert verdict['error_name'] == 'OLD_HEADER_TIMESTAMP'
-    accepted = values(planner.verdicts()[0])
+    accepted = values(planner.statuses()[0])
     assert accepted['plan_id'] == '1'
     assert (accepted['error_code'], accepted['error_name']) == ('0', 'SUCCESSFUL')
     assert accepted['strategy'] == 'min_control_effort'
@@ -161,7 +130,7 @@ def test_the_verdict_states_numbers_and_repeats_the_goal(planner):
 
 
 def test_plan_and_flat_plan_are_latched_and_share_their_times(planner, graph):
-    planner.send(goal())
+    planner.ask(goal())
     plan = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
     flat = graph.collect(JointTrajectory, '/flat_planner/flat_plan', interfaces.LATCHED)
     status = graph.collect(DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY)
@@ -183,9 +152,9 @@ def test_plan_and_flat_plan_are_latched_and_share_their_times(planner, graph):
 
 
 def test_the_reference_follows_the_plan_and_the_end_is_announced(planner, graph):
-    planner.send(goal(duration=0.3))
+    planner.ask(goal(duration=0.3))
     graph.expect(lambda: len(planner.status) > 1, 'the end of the motion')
-    finished = values(planner.verdicts()[1])
+    finished = values(planner.statuses()[1])
     assert (finished['state'], finished['plan_id']) == ('FINISHED', '1')
     end = float(finished['start_time']) + 0.3
     assert planner.now() >= end
@@ -250,10 +219,10 @@ def refused_goals() -> dict[str, tuple[JointTrajectory, str, str]]:
 
 
 def test_every_malformed_goal_gets_one_rejection_and_leaves_the_motion_alone(planner):
-    planner.send(goal(stamp=planner.now() + 60.0))
+    planner.ask(goal(stamp=planner.now() + 60.0))
     cases = refused_goals()
     for name, (message, code, error_name) in cases.items():
-        verdict = planner.send(message)
+        verdict = planner.ask(message)
         found = (verdict['state'], verdict['error_code'], verdict['error_name'])
         assert found == ('REJECTED', code, error_name), name
         assert verdict['level'] == DiagnosticStatus.ERROR
@@ -264,7 +233,7 @@ def test_every_malformed_goal_gets_one_rejection_and_leaves_the_motion_alone(pla
 
 
 def test_a_rejection_names_joint_value_and_limit(planner):
-    verdict = planner.send(goal(velocities=[0.5]))
+    verdict = planner.ask(goal(velocities=[0.5]))
     assert (verdict['joint'], verdict['value'], verdict['limit']) == ('joint1', '0.5', '0')
     for text in ('joint1', 'velocity', '0.5'):
         assert text in verdict['message']
@@ -276,9 +245,9 @@ def test_verdicts_come_in_the_order_of_the_goals(planner, graph):
     for duration in durations:
         graph.publish(GOAL, goal(duration=duration))
     graph.expect(lambda: len(planner.status) >= 5, 'five verdicts')
-    echoed = [float(values(s)['goal.time_from_start']) for s in planner.verdicts()[:5]]
+    echoed = [float(values(s)['goal.time_from_start']) for s in planner.statuses()[:5]]
     assert echoed == durations
-    states = [values(s)['state'] for s in planner.verdicts()[:5]]
+    states = [values(s)['state'] for s in planner.statuses()[:5]]
     assert states == ['REJECTED', 'ACCEPTED', 'REJECTED', 'REJECTED', 'REJECTED']
 
 
@@ -291,23 +260,23 @@ def test_verdicts_come_in_the_order_of_the_goals(planner, graph):
 )
 def test_an_arm_that_is_not_at_rest_is_not_moved(planner, measured, code, joint):
     planner.measure(**{'position': (0.1, 0.0), **measured, 'names': ('joint1', 'joint2')})
-    verdict = planner.send(goal())
+    verdict = planner.ask(goal())
     assert (verdict['error_code'], verdict['joint']) == (code, joint)
 
 
 def test_without_fresh_joint_states_nothing_starts(graph):
-    planner = Planner(graph, {'start.joint_state_timeout': 0.2})
-    assert planner.send(goal())['error_name'] == 'START_STATE_UNKNOWN'
+    planner = Patient(graph, {'start.joint_state_timeout': 0.2})
+    assert planner.ask(goal())['error_name'] == 'START_STATE_UNKNOWN'
     planner.measure()
     measured_at = planner.now()
     graph.expect(lambda: planner.now() > measured_at + 0.3, 'time to pass')
-    assert planner.send(goal())['error_name'] == 'START_STATE_STALE'
+    assert planner.ask(goal())['error_name'] == 'START_STATE_STALE'
 
 
 def test_joint_states_of_other_robots_and_in_other_orders_are_understood(graph):
-    planner = Planner(graph)
+    planner = Patient(graph)
     planner.measure((0.0, 0.4, 7.0), (nan, nan, nan), ('joint2', 'joint1', 'gripper'))
-    planner.send(goal())
+    planner.ask(goal())
     graph.expect(lambda: planner.plans, 'the plan')
     assert list(planner.plans[0].points[0].positions) == [0.4, 0.0]
     state = JointState(name=['wheel'], position=[1.0])
@@ -316,10 +285,10 @@ def test_joint_states_of_other_robots_and_in_other_orders_are_understood(graph):
 
 
 def test_a_pose_is_a_goal_with_the_default_duration(graph):
-    planner = Planner(graph, {'duration.default': 0.8})
+    planner = Patient(graph, {'duration.default': 0.8})
     planner.measure()
     pose = JointState(name=['joint1'], position=[1.0])
-    verdict = planner.send(pose, 'goal_state')
+    verdict = planner.ask(pose, '/flat_planner/goal_state')
     assert (verdict['state'], verdict['duration']) == ('ACCEPTED', '0.8')
 
 
@@ -327,7 +296,7 @@ def test_a_future_stamp_is_kept_exactly(planner, graph):
     message = goal()
     message.header.stamp.sec = int(planner.now()) + 50
     message.header.stamp.nanosec = 123_456_789
-    planner.send(message)
+    planner.ask(message)
     graph.expect(lambda: planner.commands, 'the command')
     stamp = planner.commands[0].header.stamp
     assert stamp.sec == message.header.stamp.sec
@@ -337,13 +306,13 @@ def test_a_future_stamp_is_kept_exactly(planner, graph):
 def test_changed_parameters_apply_to_the_next_plan_and_to_a_replan(planner, graph):
     results = graph.set_parameters('flat_planner', execute=False)
     assert results[0].successful
-    first = planner.send(goal())
+    first = planner.ask(goal())
     graph.set_parameters(
         'flat_planner', **{'strategy': 'min_potential_energy', 'model.damping': 0.0}
     )
     response = graph.call(Trigger, '/flat_planner/replan')
     assert response.success
-    second = values(planner.verdicts()[1])
+    second = values(planner.statuses()[1])
     assert first['strategy'] == 'min_control_effort'
     assert second['strategy'] == 'min_potential_energy'
     assert float(second['rms_effort.joint1']) == pytest.approx(0.008692, rel=5e-3)
@@ -387,7 +356,7 @@ def test_an_impossible_parameter_is_refused_with_a_reason(planner, graph, name, 
     assert not result.successful
     assert text in result.reason
     assert graph.get_parameters('flat_planner', name) == before
-    assert planner.send(goal())['state'] == 'ACCEPTED'
+    assert planner.ask(goal())['state'] == 'ACCEPTED'
 
 
 def test_limits_that_limit_nothing_are_allowed(planner, graph):
@@ -398,9 +367,9 @@ def test_a_custom_cost_is_planned(graph):
     matrix = np.zeros((6, 6))
     matrix[5, 5] = 1.0
     matrix[1, 1] = 17.0**8
-    planner = Planner(graph, {'strategy': 'custom', 'weights.Q': matrix.ravel().tolist()})
+    planner = Patient(graph, {'strategy': 'custom', 'weights.Q': matrix.ravel().tolist()})
     planner.measure()
-    verdict = planner.send(goal())
+    verdict = planner.ask(goal())
     assert float(verdict['rms_effort.joint1']) == pytest.approx(0.008709, rel=1e-3)
 
 
@@ -411,9 +380,9 @@ def test_the_command_can_be_cut_to_what_an_executor_takes(graph):
         'command.stamp': 'zero',
         'sampling.period': 0.01,
     }
-    planner = Planner(graph, changes)
+    planner = Patient(graph, changes)
     planner.measure()
-    planner.send(goal())
+    planner.ask(goal())
     graph.expect(lambda: planner.commands and planner.plans, 'command and plan')
     command = planner.commands[0]
     assert command.joint_names == ['joint1']
@@ -425,30 +394,31 @@ def test_the_command_can_be_cut_to_what_an_executor_takes(graph):
 
 
 def test_namespaces_and_remappings_hold(graph):
-    planner = Planner(graph, {}, '-r', '__ns:=/left', '-r', 'joint_states:=/left/measured')
+    planner = Patient(graph, {}, '-r', '__ns:=/left', '-r', 'joint_states:=/left/measured')
     assert planner.name == '/left/flat_planner'
     state = JointState(name=['joint1', 'joint2'], position=[0.2, 0.0])
     state.header.stamp = stamps.time_msg(planner.now())
     graph.publish('/left/measured', state)
     graph.expect(lambda: planner.node._session.measured is not None, 'the measured state')
-    assert planner.send(goal())['state'] == 'ACCEPTED'
+    assert planner.ask(goal())['state'] == 'ACCEPTED'
 
 
 def test_an_internal_error_is_a_verdict_too(graph):
     parameters = ['start.source:=parameter', 'start.position:=[0.0, 0.0]']
     words = [word for parameter in parameters for word in ('-p', parameter)]
     process = graph.start('planner_node', '--ros-args', *words)
-    status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
-    assert ask(graph, status, goal(duration=0.3))['state'] == 'ACCEPTED'
-    graph.expect(lambda: values(status[-1].status[0])['state'] == 'FINISHED', 'the end')
+    planner = Rig(graph)
+    planner.hear_planner()
+    assert planner.ask(goal(duration=0.3))['state'] == 'ACCEPTED'
+    graph.expect(lambda: planner.verdicts('FINISHED'), 'the end')
     # As much memory as it has, and no more: nothing that the planner foresees.
     _, most = resource.prlimit(process.pid, resource.RLIMIT_AS)
     pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[0])
     resource.prlimit(process.pid, resource.RLIMIT_AS, (pages * resource.getpagesize(), most))
-    verdict = ask(graph, status, goal(duration=500.0))
+    verdict = planner.ask(goal(duration=500.0))
     assert (verdict['error_code'], verdict['error_name']) == ('-199', 'INTERNAL')
     resource.prlimit(process.pid, resource.RLIMIT_AS, (most, most))
-    assert ask(graph, status, goal(duration=500.0))['state'] == 'ACCEPTED'
+    assert planner.ask(goal(duration=500.0))['state'] == 'ACCEPTED'
 
 
 BAD_ARGUMENTS = {
@@ -516,8 +486,8 @@ def test_an_interrupt_ends_the_node_with_exit_code_0(graph, number):
 
 
 def test_the_start_position_may_be_a_parameter(graph):
-    planner = Planner(graph, {'start.source': 'parameter', 'start.position': [0.5, 0.0]})
-    verdict = planner.send(goal())
+    planner = Patient(graph, {'start.source': 'parameter', 'start.position': [0.5, 0.0]})
+    verdict = planner.ask(goal())
     assert verdict['state'] == 'ACCEPTED'
     graph.expect(lambda: planner.plans, 'the plan')
     assert planner.plans[0].points[0].positions[0] == 0.5

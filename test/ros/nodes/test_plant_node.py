@@ -28,7 +28,7 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.exceptions import ParameterException
-from ros.world import Observer, stamp
+from ros.rig import Rig, stamp
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -54,13 +54,13 @@ PEAK = 1e-3
 """Of the efforts commanded here [N m]."""
 
 
-class Plant(Observer):
+class Plant(Rig):
     """The node under test and everything that it shows."""
 
     def __init__(self, graph, parameters=None, *arguments):
         """Listen first, so that nothing is missed, then start it."""
-        self.graph = graph
-        self.states = graph.collect(JointState, 'joint_states', matched=False)
+        super().__init__(graph)
+        self.hear_plant(matched=False)
         self.node = graph.create(PlantNode, parameters, *arguments)
         if not self.node.get_parameter('use_sim_time').value:
             graph.expect(lambda: self.states, 'a joint state')

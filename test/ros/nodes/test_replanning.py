@@ -19,7 +19,7 @@ from math import pi
 from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
-from ros.world import stamp, Suite, values
+from ros.rig import stamp, Suite, values
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory

@@ -17,11 +17,10 @@
 from math import pi
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import interfaces
 import pytest
 from rcl_interfaces.msg import SetParametersResult
-from ros.world import ask, goal, REPORT, STATUS, Suite, values
+from ros.rig import goal, Planner, REPORT, Suite, values
 from std_srvs.srv import Trigger
 
 STIFFNESS, DAMPING, INERTIA = 3e-3, 2e-5, (6.4e-4, 3.3e-5)
@@ -54,7 +53,7 @@ class Tuned(Suite):
         self.graph.expect(lambda: not any(self.states[-1].velocity), 'the reset')
         seen = len(self.states)
         self.graph.expect(lambda: len(self.states) >= seen + QUEUE, 'the reset at the planner')
-        _, report = self.move(angle)
+        _, report = self.carry_out(angle)
         assert self.outcomes()[-2:] == ['ACCEPTED', 'FINISHED']
         return report
 
@@ -88,14 +87,8 @@ def report_msg(start=5.0, factor=1.1, basis='free', **changes):
     return DiagnosticArray(status=[status])
 
 
-class Bench:
+class Told(Planner):
     """A planner alone, told by hand what a monitor would report."""
-
-    def __init__(self, graph, **parameters):
-        """Start the planner."""
-        self.graph = graph
-        self.node = graph.create(PlannerNode, parameters)
-        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
 
     def report(self, message):
         """Publish a report and let the planner read it."""
@@ -179,7 +172,7 @@ def test_a_motor_that_holds_is_recognised(graph):
 
 @pytest.mark.parametrize('basis', ['free', 'held'])
 def test_an_estimate_is_adopted_once(graph, basis):
-    bench = Bench(graph)
+    bench = Told(graph)
     assert bench.adopt() == (False, 'no trustworthy estimate has been reported yet')
     bench.report(report_msg(basis=basis))
     # A later report without an estimate does not take this one away.
@@ -214,7 +207,7 @@ def test_an_estimate_is_adopted_once(graph, basis):
     ],
 )
 def test_what_does_not_fit_is_refused_with_a_reason(graph, changes, reason):
-    bench = Bench(graph)
+    bench = Told(graph)
     bench.report(report_msg(**changes))
     success, answer = bench.adopt()
     assert not success
@@ -224,7 +217,7 @@ def test_what_does_not_fit_is_refused_with_a_reason(graph, changes, reason):
 
 
 def test_parameters_that_refuse_leave_the_estimate_for_later(graph):
-    bench = Bench(graph)
+    bench = Told(graph)
     bench.report(report_msg())
 
     def refuse(_):
@@ -239,7 +232,7 @@ def test_parameters_that_refuse_leave_the_estimate_for_later(graph):
 
 
 def test_auto_tune_leaves_estimates_from_other_motions_alone(graph):
-    bench = Bench(
+    bench = Told(
         graph,
         auto_tune=True,
         execute=False,
@@ -247,7 +240,7 @@ def test_auto_tune_leaves_estimates_from_other_motions_alone(graph):
         **{'start.position': [0.0, 0.0]},
     )
     bench.report(report_msg())
-    start = float(ask(graph, bench.status, goal(1.0))['start_time'])
+    start = float(bench.ask(goal(1.0))['start_time'])
     bench.report(report_msg(start=start - 1.0))
     assert bench.model() == [STIFFNESS, DAMPING]
     bench.report(report_msg(start=f'{start:.9f}'))

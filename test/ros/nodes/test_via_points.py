@@ -17,7 +17,7 @@
 from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
-from ros.world import ask, goal, stamp, Suite, values
+from ros.rig import goal, stamp, Suite, values
 from trajectory_msgs.msg import JointTrajectory
 
 TIMES = (0.4, 1.0, 1.6, 2.2)
@@ -43,7 +43,7 @@ def last_link(plan: JointTrajectory) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize('strategy', ['polynomial', 'min_control_effort'])
 def test_a_goal_with_three_via_points(graph, strategy):
     suite = Suite(graph, planner={'strategy': strategy})
-    verdict = ask(graph, suite.status, through(TIMES))
+    verdict = suite.ask(through(TIMES))
     assert verdict['state'] == 'ACCEPTED'
     assert float(verdict['duration']) == TIMES[-1]
     graph.expect(lambda: suite.plans, 'the plan')
@@ -68,7 +68,7 @@ def test_a_goal_with_three_via_points(graph, strategy):
 
 def test_via_points_without_times(graph):
     suite = Suite(graph, planner={'duration.default': 2.2, 'strategy': 'min_control_effort'})
-    verdict = ask(graph, suite.status, through([0.0] * len(TIMES)))
+    verdict = suite.ask(through([0.0] * len(TIMES)))
     assert verdict['state'] == 'ACCEPTED'
     prescribed_cost = float(verdict['cost'])
     graph.expect(lambda: suite.plans, 'the plan')
@@ -88,7 +88,7 @@ def test_velocities_at_via_points_are_refused(graph):
     message = goal(1.0)
     message.points[0].velocities = [0.5]
     message.points += goal(2.0, 2.0).points
-    verdict = ask(graph, suite.status, message)
+    verdict = suite.ask(message)
     assert verdict['error_name'] == 'INVALID_GOAL'
     assert verdict['joint'] == 'joint1'
     assert 'via points' in suite.status[0].status[0].message

@@ -27,7 +27,6 @@ import resource
 from time import perf_counter
 
 from builtin_interfaces.msg import Duration, Time
-from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
@@ -40,7 +39,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
-from ros.world import answers, goal
+from ros.rig import goal, Planner
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -172,25 +171,15 @@ def now_of(node) -> float:
     return stamps.now(node.get_clock())
 
 
-class Goals:
-    """A planner that is sent goals, and everything that it says."""
+class Goals(Planner):
+    """A planner that is sent goals."""
 
     def __init__(self, graph):
         """Start it at rest, where the age of the measured state does not matter."""
-        self.graph = graph
         parameters = {'start.joint_state_timeout': 1e6, 'start.position_tolerance': 10.0}
-        self.planner = graph.create(PlannerNode, parameters)
-        self.states = Counter()
-        self.status = graph.collect(
-            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
-        )
-        self.commands = graph.collect(
-            JointTrajectory, '/flat_planner/joint_trajectory', interfaces.RELIABLE
-        )
-        state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
-        state.header.stamp = stamps.time_msg(now_of(self.planner))
-        graph.publish('/joint_states', state)
-        graph.expect(lambda: self.planner._session.measured is not None, 'the measured state')
+        super().__init__(graph, parameters)
+        self.outcomes = Counter()
+        self.measure()
         self.publisher = graph.probe.create_publisher(JointTrajectory, '/flat_planner/goal', 10)
         graph.expect(self.publisher.get_subscription_count, 'the planner on its goals')
         self.slowest = 0.0
@@ -201,12 +190,12 @@ class Goals:
         data = serialize_message(message)  # takes seconds for an enormous one
         begin = perf_counter()
         self.publisher.publish(data)
-        self.graph.expect(lambda: answers(self.status), 'a verdict')
+        self.graph.expect(lambda: self.answers(), 'a verdict')
         elapsed = perf_counter() - begin
-        (verdict,) = answers(self.status)
+        (verdict,) = self.answers()
         if verdict['state'] == 'REJECTED':
             self.slowest = max(self.slowest, elapsed)
-        self.states[verdict['state']] += 1
+        self.outcomes[verdict['state']] += 1
         self.graph.log.clear()
         return verdict
 
@@ -217,7 +206,7 @@ def test_every_random_goal_gets_one_verdict(graph):
     @random_messages(500)
     @given(st.one_of(trajectories(effort=False), trajectories(effort=False), plain_goals()))
     def send(message):
-        session = goals.planner._session
+        session = goals.node._session
         motion, count = session.motion, len(goals.commands)
         efforts = b'' if motion is None else motion.samples.efforts.tobytes()
         verdict = goals.send(message)
@@ -237,7 +226,7 @@ def test_every_random_goal_gets_one_verdict(graph):
     send()
     for message in enormous():
         assert goals.send(message)['state'] == 'REJECTED'
-    accepted, rejected = goals.states['ACCEPTED'], goals.states['REJECTED']
+    accepted, rejected = goals.outcomes['ACCEPTED'], goals.outcomes['REJECTED']
     assert accepted
     print(
         f'\n{accepted + rejected} goals: {accepted} accepted, {rejected} rejected; '
@@ -254,8 +243,8 @@ def test_goals_leave_no_memory_behind(graph):
             # Straight to the node: what collects messages here would grow itself.
             for final in (random.uniform(0.5, 3.0), -1.0):
                 data = serialize_message(goal(1.0, final))
-                goals.planner._answer(goal_from_trajectory, data)
-            goals.planner._report_ended()
+                goals.node._answer(goal_from_trajectory, data)
+            goals.node._report_ended()
 
     send(300)
     before = memory()
@@ -267,7 +256,7 @@ def test_random_joint_states_harm_no_node(graph):
     goals = Goals(graph)
     monitor = graph.create(MonitorNode)
     assert goals.send(goal(1.0, 60.0))['state'] == 'ACCEPTED'
-    track = goals.planner._session.track(0.0)
+    track = goals.node._session.track(0.0)
 
     @random_messages(200)
     @given(joint_states())
@@ -276,7 +265,7 @@ def test_random_joint_states_harm_no_node(graph):
         graph.spin_until(lambda: True)
 
     send()
-    assert (goals.planner._session.track(0.0).efforts == track.efforts).all()
+    assert (goals.node._session.track(0.0).efforts == track.efforts).all()
     _still_serves(graph, goals, monitor)
 
 
@@ -337,7 +326,7 @@ def test_random_parameters_are_refused_or_consistent(graph, node_class, rows):
 def _still_serves(graph, goals: Goals, monitor) -> None:
     """Check that planner and monitor answer as before."""
     state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
-    state.header.stamp = stamps.time_msg(now_of(goals.planner))
+    state.header.stamp = stamps.time_msg(now_of(goals.node))
     graph.publish('/joint_states', state, readers=2)
     assert goals.send(goal(1.0, 1.0))['state'] == 'ACCEPTED'
     graph.expect(lambda: monitor.get_name() == 'flat_monitor', 'the monitor')

@@ -32,7 +32,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 NODES = ('planner_node', 'plant_node', 'monitor_node')
 GOAL, STATUS = '/flat_planner/goal', '/flat_planner/status'
-COMMAND = '/flat_planner/joint_trajectory'
+PLAN, COMMAND = '/flat_planner/plan', '/flat_planner/joint_trajectory'
+STATES = '/joint_states'
 REPORT = '/flat_monitor/report'
 EVERY_VERDICT = QoSProfile(depth=1000, durability=interfaces.LATCHED.durability)
 ANSWERS = ('ACCEPTED', 'REJECTED')
@@ -72,31 +73,6 @@ def table(trajectory, field):
     return np.array([list(getattr(point, field)) for point in trajectory.points])
 
 
-def answers(status):
-    """Return the values of all verdicts on goals."""
-    return [v for v in map(values, status) if v.get('state') in ANSWERS]
-
-
-def ask(graph, status, message, topic=GOAL):
-    """Send a goal; return the first verdict that `status` collects after it."""
-    count = len(answers(status))
-    graph.publish(topic, message, interfaces.BURST)
-    graph.expect(lambda: len(answers(status)) > count, 'a verdict')
-    return answers(status)[count]
-
-
-def move(graph, status, message, topic=GOAL):
-    """Send a goal until it is accepted: at first a planner may not have heard of the arm."""
-    until = monotonic() + TIMEOUT
-    while True:
-        verdict = ask(graph, status, message, topic)
-        if verdict['state'] == 'ACCEPTED':
-            return verdict
-        assert verdict['error_name'] in NOT_YET, verdict
-        assert monotonic() < until, verdict
-        graph.spin_until(lambda: False, 0.1)
-
-
 class Late(Exception):
     """An attempt was too late to show anything; the text says what came late."""
 
@@ -120,16 +96,120 @@ def on_time(attempt):
     return not_verified(f'late in all of {ATTEMPTS} attempts, the last: {reason}')
 
 
-class Observer:
-    """Somebody with a `graph` who collects an arm's `states`."""
+class Rig:
+    """
+    An arm's nodes, in this process or in others, and what is heard of them.
+
+    Attributes
+    ----------
+    status, plans, commands
+        What the planner has said, once `hear_planner` was called.
+    states
+        What the plant has shown, once `hear_plant` was called.
+    reports
+        What the monitor has said, once `hear_monitor` was called.
+
+    """
+
+    def __init__(self, graph, namespace=''):
+        """Know where they are, in a namespace such as '/left'."""
+        self.graph = graph
+        self.namespace = namespace
+
+    def hear(self, kind, topic, qos=1000, *, matched=True):
+        """Return a list that grows with every message on a topic of this arm."""
+        return self.graph.collect(kind, self.namespace + topic, qos, matched=matched)
+
+    def hear_planner(self, *, matched=True):
+        """Listen to the planner; `matched`, here and below, waits until it is found."""
+        self.status = self.hear(DiagnosticArray, STATUS, EVERY_VERDICT, matched=matched)
+        self.plans = self.hear(JointTrajectory, PLAN, interfaces.LATCHED, matched=matched)
+        self.commands = self.hear(JointTrajectory, COMMAND, matched=matched)
+
+    def hear_plant(self, *, matched=True):
+        """Listen to the plant."""
+        self.states = self.hear(JointState, STATES, matched=matched)
+
+    def hear_monitor(self, *, matched=True):
+        """Listen to the monitor."""
+        self.reports = self.hear(DiagnosticArray, REPORT, interfaces.LATCHED, matched=matched)
 
     def wait_until(self, time):
         """Wait for a joint state stamped then or later."""
         self.graph.expect(lambda: self.states and stamp(self.states[-1]) >= time, f'{time} s')
 
+    def verdicts(self, *states):
+        """Return the values of all that was said of goals and motions in one of these states."""
+        return [v for v in map(values, self.status) if v.get('state') in states]
 
-class Suite(Observer):
-    """The three nodes in this process, the plant owning the time, and what they say."""
+    def answers(self):
+        """Return the values of all verdicts on goals."""
+        return self.verdicts(*ANSWERS)
+
+    def ask(self, message, topic=GOAL):
+        """Send a goal; return the values of its verdict, with `message` and `level`."""
+        seen = len(self.status)
+
+        def answered():
+            return [s for s in self.status[seen:] if values(s).get('state') in ANSWERS]
+
+        self.graph.publish(self.namespace + topic, message, interfaces.BURST)
+        self.graph.expect(answered, 'a verdict')
+        verdict = answered()[0]
+        status = verdict.status[0]
+        return {**values(verdict), 'message': status.message, 'level': status.level}
+
+    def send(self, positions, duration=1.0):
+        """Send a goal for the first joints; return its verdict as `ask` does."""
+        return self.ask(goal(positions, duration))
+
+    def move(self, positions, duration=1.0):
+        """Send a goal until it is accepted: at first a planner may not have heard of the arm."""
+        until = monotonic() + TIMEOUT
+        verdict = self.send(positions, duration)
+        while verdict['state'] != 'ACCEPTED':
+            assert verdict['error_name'] in NOT_YET, verdict
+            assert monotonic() < until, verdict
+            seen = len(self.states)
+            self.graph.spin_until(lambda n=seen: len(self.states) > n, 0.1)
+            verdict = self.send(positions, duration)
+        self.begin = float(verdict['start_time'])
+        self.end = self.begin + float(verdict['duration'])
+        return verdict
+
+    def efforts(self, since=0.0):
+        """Return the efforts of joint 1 from a time [s] on [N m]."""
+        return np.array([s.effort[0] for s in self.states if stamp(s) >= since])
+
+
+class Planner(Rig):
+    """A planner alone, in this process."""
+
+    def __init__(self, graph, parameters=None, *arguments):
+        """Start it."""
+        self.node = graph.create(PlannerNode, parameters, *arguments)
+        super().__init__(graph, self.node.get_namespace().rstrip('/'))
+        self.hear_planner()
+
+    def now(self):
+        """Return the time of the node [s]."""
+        return stamps.now(self.node.get_clock())
+
+    def measure(self, position=(0.0, 0.0), velocity=(0.0, 0.0), names=('joint1', 'joint2')):
+        """Publish a joint state and wait until the node has it."""
+        state = JointState(name=list(names), position=list(position), velocity=list(velocity))
+        state.header.stamp = stamps.time_msg(self.now())
+        self.graph.publish(self.node.resolve_topic_name('joint_states'), state)
+
+        def has_arrived():
+            sample = self.node._session.measured
+            return sample is not None and sample.time == stamp(state)
+
+        self.graph.expect(has_arrived, 'the measured state')
+
+
+class Suite(Rig):
+    """The three nodes in this process, the plant owning the time."""
 
     def __init__(self, graph, planner=None, plant=None, *given, speed=3.0, window=2.0):
         """
@@ -137,28 +217,22 @@ class Suite(Observer):
 
         By default as many simulated seconds per second as one process keeps up with when busy.
         """
-        self.graph = graph
+        super().__init__(graph)
         simulated = {'use_sim_time': True}
         slow = {'reference_rate': 10.0, 'start_delay': START_DELAY}
         clock = {'publish_clock': True, 'real_time_factor': speed}
         self.planner = graph.create(PlannerNode, {**simulated, **slow, **(planner or {})}, *given)
         graph.create(MonitorNode, {**simulated, 'window': window}, *given)
         graph.create(PlantNode, {**clock, **(plant or {})}, *given)
-        self.status = graph.collect(DiagnosticArray, STATUS, interfaces.LATCHED_HISTORY)
-        self.reports = graph.collect(DiagnosticArray, REPORT, interfaces.LATCHED)
-        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
-        self.commands = graph.collect(JointTrajectory, COMMAND)
-        self.states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
+        self.hear_planner()
+        self.hear_monitor()
+        self.hear_plant()
         graph.expect(
-            lambda: graph.probe.count_subscribers('/joint_states') == 3 and self.states,
+            lambda: graph.probe.count_subscribers(STATES) == 3 and self.states,
             'the three nodes on joint_states',
         )
 
-    def send(self, positions, duration=1.0):
-        """Send a goal; return its verdict."""
-        return ask(self.graph, self.status, goal(positions, duration))
-
-    def move(self, positions, duration=1.0):
+    def carry_out(self, positions, duration=1.0):
         """Carry a goal out; return the values of its verdict and of the report on its motion."""
         count = len(self.reports)
         verdict = self.send(positions, duration)
@@ -166,32 +240,31 @@ class Suite(Observer):
         self.graph.expect(lambda: len(self.reports) > count, 'a report')
         return verdict, values(self.reports[-1])
 
-    def verdicts(self, *states):
-        """Return the values of all verdicts with one of these states."""
-        return [v for v in map(values, self.status) if v['state'] in states]
 
+class World(Rig):
+    """The three nodes in processes."""
 
-class World(Observer):
-    """The three nodes in processes, and what they say."""
+    def __init__(
+        self, graph, *programs, arguments=(), delay=START_DELAY, namespace='', **environment
+    ):
+        """
+        Start them, in one process or in several.
 
-    def __init__(self, graph, *programs, arguments=(), namespace='', **environment):
-        """Start them, in one process or in several, the arm in a namespace such as '/left'."""
-        self.graph, self.environment, self.namespace = graph, environment, namespace
+        The `delay` is that of every motion and splice [s]; None leaves the planner's own.
+        """
+        super().__init__(graph, namespace)
+        self.environment = environment
+        self.processes = {}
         self.arguments = ['--ros-args', *arguments]
-        for name in ('start_delay', 'replan.lookahead'):
-            self.arguments += ['-p', f'flat_planner:{name}:={START_DELAY}']
+        if delay is not None:
+            for name in ('start_delay', 'replan.lookahead'):
+                self.arguments += ['-p', f'flat_planner:{name}:={delay}']
         if namespace:
             self.arguments += ['-r', f'__ns:={namespace}']
-        self.states = self.collect(JointState, '/joint_states')
-        self.status = self.collect(DiagnosticArray, STATUS, EVERY_VERDICT)
-        self.commands = self.collect(JointTrajectory, COMMAND)
-        self.reports = self.collect(DiagnosticArray, REPORT, interfaces.LATCHED)
-        self.processes = {}
+        self.hear_plant(matched=False)
+        self.hear_planner(matched=False)
+        self.hear_monitor(matched=False)
         self.start(*programs or ['demo'])
-
-    def collect(self, kind, topic, qos=1000):
-        """Return a list that grows with every message on a topic of this arm."""
-        return self.graph.collect(kind, self.namespace + topic, qos, matched=False)
 
     def start(self, *programs):
         """Start programs and wait until their nodes are ready."""
@@ -207,22 +280,6 @@ class World(Observer):
             self.processes.pop(name).kill()
         return stamps.now(self.graph.probe.get_clock())
 
-    def answers(self):
-        """Return the values of all verdicts."""
-        return answers(self.status)
-
-    def ask(self, position, duration=1.0):
-        """Send a goal; return its verdict."""
-        return ask(self.graph, self.status, goal(position, duration), self.namespace + GOAL)
-
-    def move(self, position, duration=1.0):
-        """Send a goal until it is accepted; return its verdict."""
-        topic = self.namespace + GOAL
-        verdict = move(self.graph, self.status, goal(position, duration), topic)
-        self.begin = float(verdict['start_time'])
-        self.end = self.begin + float(verdict['duration'])
-        return verdict
-
     def amplitude(self):
         """Return what the monitor says of the present motion [rad]."""
 
@@ -232,10 +289,6 @@ class World(Observer):
 
         self.graph.expect(mine, 'a report of this motion')
         return float(mine()[-1].get('amplitude', 'nan'))  # not where samples were missing
-
-    def efforts(self, since=0.0):
-        """Return the efforts of joint 1 from a time [s] on [N m]."""
-        return np.array([s.effort[0] for s in self.states if stamp(s) >= since])
 
     def lateness(self, allowed=0.0):
         """Return all that this arm's plant has said of motions that it could not play in time."""
