@@ -232,13 +232,9 @@ def test_parameters_that_refuse_leave_the_estimate_for_later(graph):
 
 
 def test_auto_tune_leaves_estimates_from_other_motions_alone(graph):
-    bench = Told(
-        graph,
-        auto_tune=True,
-        execute=False,
-        **{'start.source': 'parameter'},
-        **{'start.position': [0.0, 0.0]},
-    )
+    parameters = {'auto_tune': True, 'execute': False}
+    rest = {'start.source': 'parameter', 'start.position': [0.0, 0.0]}
+    bench = Told(graph, parameters | rest)
     bench.report(report_msg())
     start = float(bench.ask(goal(1.0))['start_time'])
     bench.report(report_msg(start=start - 1.0))
