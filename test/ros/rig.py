@@ -185,11 +185,12 @@ class Rig:
 class Planner(Rig):
     """A planner alone, in this process."""
 
-    def __init__(self, graph, parameters=None, *arguments):
-        """Start it."""
+    def __init__(self, graph, parameters=None, *arguments, is_heard=True):
+        """Start it, and listen to it."""
         self.node = graph.create(PlannerNode, parameters, *arguments)
         super().__init__(graph, self.node.get_namespace().rstrip('/'))
-        self.hear_planner()
+        if is_heard:
+            self.hear_planner()
 
     def now(self):
         """Return the time of the node [s]."""

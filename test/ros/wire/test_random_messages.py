@@ -171,13 +171,16 @@ def now_of(node) -> float:
     return stamps.now(node.get_clock())
 
 
+LENIENT = {'start.joint_state_timeout': 1e6, 'start.position_tolerance': 10.0}
+"""Parameters of a planner that takes any measured state."""
+
+
 class Goals(Planner):
     """A planner that is sent goals."""
 
     def __init__(self, graph):
         """Start it at rest, where the age of the measured state does not matter."""
-        parameters = {'start.joint_state_timeout': 1e6, 'start.position_tolerance': 10.0}
-        super().__init__(graph, parameters)
+        super().__init__(graph, LENIENT)
         self.outcomes = Counter()
         self.measure()
         self.publisher = graph.probe.create_publisher(JointTrajectory, '/flat_planner/goal', 10)
@@ -190,7 +193,7 @@ class Goals(Planner):
         data = serialize_message(message)  # takes seconds for an enormous one
         begin = perf_counter()
         self.publisher.publish(data)
-        self.graph.expect(lambda: self.answers(), 'a verdict')
+        self.graph.expect(self.answers, 'a verdict')
         elapsed = perf_counter() - begin
         (verdict,) = self.answers()
         if verdict['state'] == 'REJECTED':
@@ -235,12 +238,13 @@ def test_every_random_goal_gets_one_verdict(graph):
 
 
 def test_goals_leave_no_memory_behind(graph):
-    goals = Goals(graph)
+    goals = Planner(graph, LENIENT, is_heard=False)  # what is heard and not read would grow, too
+    goals.measure()
     random = np.random.default_rng(1)
 
     def send(count):
         for _ in range(count):
-            # Straight to the node: what collects messages here would grow itself.
+            # Straight to the node.
             for final in (random.uniform(0.5, 3.0), -1.0):
                 data = serialize_message(goal(1.0, final))
                 goals.node._answer(goal_from_trajectory, data)
