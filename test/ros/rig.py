@@ -126,9 +126,9 @@ class Rig:
         self.plans = self.hear(JointTrajectory, PLAN, interfaces.LATCHED, matched=matched)
         self.commands = self.hear(JointTrajectory, COMMAND, matched=matched)
 
-    def hear_plant(self, *, matched=True):
-        """Listen to the plant."""
-        self.states = self.hear(JointState, STATES, matched=matched)
+    def hear_plant(self, *, qos=1000, matched=True):
+        """Listen to the plant; with a long queue all is heard, but on a busy machine late."""
+        self.states = self.hear(JointState, STATES, qos, matched=matched)
 
     def hear_monitor(self, *, matched=True):
         """Listen to the monitor."""
@@ -227,7 +227,7 @@ class Suite(Rig):
         graph.create(PlantNode, {**clock, **(plant or {})}, *given)
         self.hear_planner()
         self.hear_monitor()
-        self.hear_plant()
+        self.hear_plant(qos=interfaces.RELIABLE)
         graph.expect(
             lambda: graph.probe.count_subscribers(STATES) == 3 and self.states,
             'the three nodes on joint_states',
