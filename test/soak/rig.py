@@ -114,7 +114,7 @@ class Soak(Rig):
             }
         self._file = str(CONFIG / file)
         own = {'context': graph.context, 'use_global_arguments': False}
-        self.goals, self.commands = (
+        self.to_planner, self.to_plant = (
             graph.add(Relay(JointTrajectory, source, target, seed=seed + 1, **own))
             for source, target in (
                 ('/goals', '/flat_planner/goal'),
@@ -168,14 +168,14 @@ class Soak(Rig):
         """Move once, with whatever happens."""
         self.counts['episodes'] += 1
         del self.status[:], self.reports[:], self.graph.log[:]
-        for relay in (self.goals, self.commands):
+        for relay in (self.to_planner, self.to_plant):
             relay.faults = Faults()
             del relay.received[:], relay.delivered[:]
         self._prepare(kind)
         self.graph.call(Trigger, '/flat_plant/reset')
         self._wait(0.5)
         if kind == 'transport':
-            self.goals.faults = self.commands.faults = UNEVEN
+            self.to_planner.faults = self.to_plant.faults = UNEVEN
         if kind == 'invalid':
             self._send([float('nan')] * self.joints)
         verdict = self._move()
@@ -184,7 +184,7 @@ class Soak(Rig):
                 self._wait(float(self.random.uniform(0.05, 0.4)))
                 self._send(self._pose())
                 self.counts['re-plans'] += 1
-            self._expect(lambda: self._answered() >= len(self.goals.delivered), 'verdicts')
+            self._expect(lambda: self._answered() >= len(self.to_planner.delivered), 'verdicts')
         elif kind == 'stop':
             self._wait_until(float(verdict['start_time']) + float(self.random.uniform(0.0, 0.5)))
             self.graph.call(Trigger, '/flat_planner/stop')
@@ -208,12 +208,12 @@ class Soak(Rig):
 
     def _finish(self, kind: str) -> None:
         """Wait for the last motion's report and look at everything."""
-        self._expect(lambda: self.goals.is_idle and self.commands.is_idle, 'idle relays')
-        delivered = len(self.goals.delivered)
+        self._expect(lambda: self.to_planner.is_idle and self.to_plant.is_idle, 'idle relays')
+        delivered = len(self.to_planner.delivered)
         self._expect(lambda: self._answered() >= delivered, 'all verdicts')
         accepted = [v for v in self.answers() if v['state'] == 'ACCEPTED']
-        self.counts['goals'] += len(self.goals.received)
-        self.counts['goals lost or doubled'] += abs(delivered - len(self.goals.received))
+        self.counts['goals'] += len(self.to_planner.received)
+        self.counts['goals lost or doubled'] += abs(delivered - len(self.to_planner.received))
         self.counts['goals arrived'] += delivered
         if accepted:
             self._expect(lambda: self._ended(accepted[-1]), 'the end of the last motion')
@@ -234,7 +234,7 @@ class Soak(Rig):
         if any(self.graph.logged(word) for word in DISTURBED):
             self.counts['motions late or refused, said by the plant'] += 1
             return
-        if kind == 'transport' and len(self.commands.delivered) < len(self.commands.received):
+        if kind == 'transport' and len(self.to_plant.delivered) < len(self.to_plant.received):
             self.counts['motions not played, command lost'] += 1
             return
         bound = {
@@ -261,7 +261,7 @@ class Soak(Rig):
             assert moved < 1e-9, f'the restarted plant has moved by {moved} rad'
         self._wait(2.5)
         del self.status[:], self.reports[:], self.graph.log[:]
-        for relay in (self.goals, self.commands):
+        for relay in (self.to_planner, self.to_plant):
             del relay.received[:], relay.delivered[:]
         self.graph.call(Trigger, '/flat_plant/reset')
         self._wait(0.5)
@@ -275,18 +275,20 @@ class Soak(Rig):
     def _send(self, pose: list[float]) -> None:
         """Send a goal through the relay."""
         message = goal(pose, self.random.uniform(1.2, 2.0))
-        received = len(self.goals.received)
+        received = len(self.to_planner.received)
         self.graph.publish('/goals', message)
-        self._expect(lambda: len(self.goals.received) > received, 'the goal at the relay')
+        self._expect(lambda: len(self.to_planner.received) > received, 'the goal at the relay')
 
     def _move(self) -> dict[str, str]:
         """Send goals until one is accepted; return its verdict."""
         for _ in range(30):
-            delivered = len(self.goals.delivered)
+            delivered = len(self.to_planner.delivered)
             self._send(self._pose())
-            self._expect(lambda: self.goals.is_idle, 'an idle relay')
-            if len(self.goals.delivered) > delivered:
-                self._expect(lambda: self._answered() >= len(self.goals.delivered), 'a verdict')
+            self._expect(lambda: self.to_planner.is_idle, 'an idle relay')
+            if len(self.to_planner.delivered) > delivered:
+                self._expect(
+                    lambda: self._answered() >= len(self.to_planner.delivered), 'a verdict'
+                )
                 accepted = [v for v in self.answers() if v['state'] == 'ACCEPTED']
                 if accepted:
                     return accepted[-1]
