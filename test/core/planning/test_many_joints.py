@@ -199,8 +199,8 @@ def test_friction_is_compensated_where_asked_for(n, model):
         ({'via': (ViaPoint(time=0.5, values=[1.0]),)}, 'has 1 values for 2 flat outputs'),
         ({'via': (ViaPoint(time=1.5, values=[1.0, 2.0]),)}, 'before the end at 1 s'),
         ({'via': (ViaPoint(time=0.5, values=[1.0, 2.0]),) * 2}, 'must lie after 0.5 s'),
-        ({'start_jets': np.zeros((3, 6))}, r'finite of shape \(2, 6\)'),
-        ({'start_jets': np.full((2, 6), np.nan)}, r'finite of shape \(2, 6\)'),
+        ({'start_jets': np.zeros((3, 6))}, r'must have shape \(2, 6\)'),
+        ({'start_jets': np.full((2, 6), np.nan)}, 'must be finite'),
     ],
 )
 def test_refuses_a_request_that_contradicts_itself(change, message):
