@@ -30,7 +30,7 @@ import numpy as np
 
 
 class FlatModel(Enum):
-    """How the damping of the elastic joint enters the flat map."""
+    """How the damping of the passive joint enters the flat map."""
 
     APPROXIMATE = 'approximate'
     """The paper's first-order Taylor expansion of the damping term: w = y1."""
@@ -51,7 +51,7 @@ class FlatMap:
     output
         Row of the flat output y1, the absolute angle of the last link, shape (i,) [s^k].
     deflection
-        Row of the elastic joint's angle q_n, shape (j,) [s^k].
+        Row of the passive joint's angle q_n, shape (j,) [s^k].
     effort
         Row of the effort of joint n-1, shape (m,) [N m s^k / rad].
 
@@ -81,7 +81,7 @@ def flat_map(arm: PlanarArm, model: FlatModel = FlatModel.EXACT) -> FlatMap:
     arm
         An arm that meets the flatness condition.
     model
-        Treatment of the damping of the elastic joint.
+        Treatment of the damping of the passive joint.
 
     Raises
     ------

@@ -73,12 +73,16 @@ class VibrationMonitor:
         self._phase = Phase.IDLE
         self._motion: PlannedMotion | None = None
         self._pending: PlannedMotion | None = None
-        self._now = self._last_sample = self._heard = -inf
+        self._now = -inf
+        self._last_sample = -inf
+        self._heard = -inf
         self._last: JointSample | None = None
-        self._dropped = self._told = 0
+        self._dropped = 0
+        self._dropped_told = 0
         self._set_back = 0.0
         self._reports: list[VibrationReport] = []
-        self._positions = self._efforts = Record(0)
+        self._positions = Record(0)
+        self._efforts = Record(0)
 
     @property
     def phase(self) -> Phase:
@@ -97,16 +101,18 @@ class VibrationMonitor:
 
     def take_warnings(self) -> list[str]:
         """Return what was wrong with the samples since this was last asked, a sentence each."""
-        troubles, new = [], self._dropped - self._told
+        warnings = []
         if self._set_back:
-            troubles.append(
+            warnings.append(
                 f'the time of the joint states was set back by {self._set_back:.3f} s: plans and '
                 'samples from before are forgotten'
             )
+        new = self._dropped - self._dropped_told
         if new:
-            troubles.append(f'{new} joint states dropped: late, repeated or not finite')
-        self._told, self._set_back = self._dropped, 0.0
-        return troubles
+            warnings.append(f'{new} joint states dropped: late, repeated or not finite')
+        self._dropped_told = self._dropped
+        self._set_back = 0.0
+        return warnings
 
     def watch(self, motion: PlannedMotion) -> list[VibrationReport]:
         """
@@ -158,8 +164,10 @@ class VibrationMonitor:
             self._dropped += 1
             return []
         self._advance(time)
-        former, self._last = self._last, sample
-        self._last_sample = self._heard = time
+        former = self._last
+        self._last = sample
+        self._last_sample = time
+        self._heard = time
         motion = self._motion
         if motion is None or self._phase is Phase.DONE:
             return self._take_reports()
@@ -230,7 +238,8 @@ class VibrationMonitor:
 
     def _take_reports(self) -> list[VibrationReport]:
         """Return the reports made since this was last asked."""
-        reports, self._reports = self._reports, []
+        reports = self._reports
+        self._reports = []
         return reports
 
     def _advance(self, now: float) -> None:
@@ -268,7 +277,9 @@ class VibrationMonitor:
         if not (is_spliced and former and former.joint_names == motion.joint_names):
             self._efforts = Record(len(motion.joint_names))
         self._positions = Record(len(motion.joint_names))
-        self._motion, self._pending, self._heard = motion, None, now
+        self._motion = motion
+        self._pending = None
+        self._heard = now
         if now < motion.end:
             self._phase = Phase.MOVING
         else:

@@ -47,6 +47,60 @@ FAR_AHEAD = 600.0
 """Time to its start from which a command looks as if it came by another clock [s]."""
 
 
+@dataclass(kw_only=True)
+class Incidents:
+    """
+    What went wrong while an arm kept in time, since it was last told.
+
+    Attributes
+    ----------
+    skipped, has_dropped
+        Time that passed without the arm [s]; whether a command was dropped there.
+    set_back, behind
+        Time by which the clock was set back, and by which an arm that leads is too slow [s].
+    broken
+        Silence that ended a stream of efforts [s], 0 without any.
+
+    """
+
+    skipped: float = 0.0
+    has_dropped: bool = False
+    set_back: float = 0.0
+    behind: float = 0.0
+    broken: float = 0.0
+
+    def sentences(self, simulated: SimulatedArm) -> list[str]:
+        """Return a sentence each, those of the arm itself first; its clipped steps count anew."""
+        told = []
+        if simulated.fault:
+            told.append(f'the arm has been stopped until it is reset: {simulated.fault}')
+        clipped = simulated.take_clipped_steps()
+        if clipped:
+            told.append(f'effort clipped by the saturation in {clipped} steps')
+        if self.broken:
+            told.append(
+                f'the stream of efforts broke, none came for {self.broken:g} s: nothing is '
+                'applied any more'
+            )
+        if self.skipped:
+            command = '; its command was dropped' if self.has_dropped else ''
+            told.append(
+                f'{self.skipped:.3f} s skipped to keep up with the clock: the arm stood still'
+                f'{command}'
+            )
+        if self.set_back:
+            told.append(
+                f'the clock was set back by {self.set_back:.3f} s: the arm kept its state, its '
+                'command was dropped'
+            )
+        if self.behind:
+            told.append(
+                f'the simulated time is {self.behind:.3f} s behind its real_time_factor: this '
+                'machine is too slow or busy'
+            )
+        return told
+
+
 class PacedArm:
     """
     A simulated arm that keeps in time with a clock and shows itself at even times.
@@ -94,7 +148,7 @@ class PacedArm:
         self._profile: EffortProfile | None = None
         self._wall: float | None = None
         self._debt = 0.0
-        self._troubles = Troubles()
+        self._incidents = Incidents()
 
     @property
     def settings(self) -> SimulationSettings:
@@ -220,7 +274,7 @@ class PacedArm:
         if lag > MAX_CATCH_UP:
             self._skip(floor(lag * self._settings.rate) / self._settings.rate)
         elif lag < -MAX_BACKWARD:
-            self._troubles.set_back -= lag
+            self._incidents.set_back -= lag
             self._offset += lag
             self._drop()
         return self._advance(now - self._offset)
@@ -254,7 +308,7 @@ class PacedArm:
         self._debt -= self._simulated.time - before
         limit = max(BATCH, factor * MAX_CATCH_UP)
         if self._debt > limit:
-            self._troubles.behind += self._debt - limit
+            self._incidents.behind += self._debt - limit
             self._debt = limit
         return samples
 
@@ -267,8 +321,9 @@ class PacedArm:
 
     def take_warnings(self) -> list[str]:
         """Return what went wrong since this was last asked, a sentence each."""
-        troubles, self._troubles = self._troubles, Troubles()
-        return troubles.sentences(self._simulated)
+        incidents = self._incidents
+        self._incidents = Incidents()
+        return incidents.sentences(self._simulated)
 
     def _advance(self, until: float) -> list[ArmState]:
         """Integrate in whole steps to an own time of the arm [s]; return the samples passed."""
@@ -280,7 +335,7 @@ class PacedArm:
             self._sampled += 1
         self._simulated.advance(target * self._simulated.step)
         if self._simulated.take_expired():
-            self._troubles.broken = self._settings.input_timeout
+            self._incidents.broken = self._settings.input_timeout
         return samples
 
     def _sample(self) -> ArmState:
@@ -333,69 +388,11 @@ class PacedArm:
     def _skip(self, lag: float) -> None:
         """Let a time [s] pass without the arm."""
         self._offset += lag
-        self._troubles.skipped += lag
+        self._incidents.skipped += lag
         profile = self._profile
         if profile is not None and self.time < profile.start:
             self._play(profile)  # at the same time outside, another one inside
             return
         if profile is not None and self.time - lag < profile.end:
-            self._troubles.has_dropped = True
+            self._incidents.has_dropped = True
         self._drop()
-
-
-@dataclass(kw_only=True)
-class Troubles:
-    """
-    What went wrong since it was last told.
-
-    Attributes
-    ----------
-    skipped
-        Time that passed without the arm [s].
-    has_dropped
-        Whether a command was dropped there.
-    set_back
-        Time by which the clock was set back [s].
-    behind
-        Time by which an arm that leads is too slow [s].
-    broken
-        Silence that ended a stream of efforts [s], 0 without any.
-
-    """
-
-    skipped: float = 0.0
-    has_dropped: bool = False
-    set_back: float = 0.0
-    behind: float = 0.0
-    broken: float = 0.0
-
-    def sentences(self, simulated: SimulatedArm) -> list[str]:
-        """Return a sentence each, those of the arm itself first; its clipped steps count anew."""
-        troubles = []
-        if simulated.fault:
-            troubles.append(f'the arm has been stopped until it is reset: {simulated.fault}')
-        clipped = simulated.take_clipped_steps()
-        if clipped:
-            troubles.append(f'effort clipped by the saturation in {clipped} steps')
-        if self.broken:
-            troubles.append(
-                f'the stream of efforts broke, none came for {self.broken:g} s: nothing is '
-                'applied any more'
-            )
-        if self.skipped:
-            command = '; its command was dropped' if self.has_dropped else ''
-            troubles.append(
-                f'{self.skipped:.3f} s skipped to keep up with the clock: the arm stood still'
-                f'{command}'
-            )
-        if self.set_back:
-            troubles.append(
-                f'the clock was set back by {self.set_back:.3f} s: the arm kept its state, its '
-                'command was dropped'
-            )
-        if self.behind:
-            troubles.append(
-                f'the simulated time is {self.behind:.3f} s behind its real_time_factor: this '
-                'machine is too slow or busy'
-            )
-        return troubles

@@ -40,25 +40,19 @@ GRID_TOLERANCE = 1e-6
 """A grid time ahead of the present by less counts as reached, relative to the step [-]."""
 
 MAX_SPEED = 10 * MAX_VELOCITY
-"""
-Joint velocity beyond which an arm is stopped [rad/s].
-
-Efforts, gains or an integration step without sense get there, and would go on to infinity.
-"""
+"""Joint velocity beyond which an arm is stopped: efforts, gains or steps make no sense [rad/s]."""
 
 
 class ArmState(NamedTuple):
     """
-    An arm's motion at one time.
+    Motion of an arm at one time.
 
     Attributes
     ----------
     time
         Simulated time [s].
-    position, velocity
-        Joint angles [rad] and velocities [rad/s], shape (n,).
-    effort
-        Effort applied at each joint, spring and damper at the passive one, shape (n,) [N m].
+    position, velocity, effort
+        Joint angles [rad], velocities [rad/s], efforts with the spring's [N m], shape (n,).
 
     """
 
@@ -114,8 +108,10 @@ class SimulatedArm:
         self._drives = Drives(
             arm, saturation=saturation, feedback_p=feedback_p, feedback_d=feedback_d
         )
-        self._origin, self._step, self._count = float(time), float(step), 0
-        self._clipped_steps, self._is_clipped = 0, False
+        self._origin, self._step = float(time), float(step)
+        self._count = 0
+        self._clipped_steps = 0
+        self._is_clipped = False
         self._profile: EffortProfile | None = None
         self.reset(np.zeros(arm.n) if position is None else position)
 
@@ -169,7 +165,8 @@ class SimulatedArm:
 
     def take_clipped_steps(self) -> int:
         """Return how many steps had an effort clipped since this was last asked."""
-        count, self._clipped_steps = self._clipped_steps, 0
+        count = self._clipped_steps
+        self._clipped_steps = 0
         return count
 
     def command(self, profile: EffortProfile, now: float) -> None:
@@ -214,7 +211,8 @@ class SimulatedArm:
         if self._is_braked:
             self._braked_until = profile.start
         self._profile = profile.taken_over(now, drives.feed_forward(present, self._position))
-        self._held, self._held_until = drives.idle, inf
+        self._held = drives.idle
+        self._held_until = inf
 
     def hold(self, effort: npt.ArrayLike, until: float = inf) -> None:
         """
@@ -238,15 +236,21 @@ class SimulatedArm:
         shape = (self.arm.n - 1,)
         held = checked_array('effort', effort, 'N m', shape=shape, error=InvalidCommand)
         check_bound('effort', held, MAX_EFFORT, 'N m')
-        self._profile, self._braked_until = None, -inf
-        self._held, self._held_until = self._drives.idle._replace(effort=held), until
+        self._profile = None
+        self._braked_until = -inf
+        self._held = self._drives.idle._replace(effort=held)
+        self._held_until = until
 
     def release(self) -> None:
         """Apply nothing until the next command; an arm with weight stands by its brakes."""
-        self._profile, self._held, self._held_until = None, self._drives.idle, inf
-        self._braked_until = self._idle_until = -inf
+        self._profile = None
+        self._idle_until = -inf
+        self._braked_until = -inf
+        self._held = self._drives.idle
+        self._held_until = inf
         if self.arm.has_weight:
-            self._braked_until, self._velocity = inf, np.zeros(self.arm.n)
+            self._braked_until = inf
+            self._velocity = np.zeros(self.arm.n)
 
     def take_expired(self) -> bool:
         """Return whether a held effort other than zero has ended, and forget that it has."""
@@ -305,7 +309,8 @@ class SimulatedArm:
             return end
         self._position = q + h * (dq + h / 6 * (ddq_1 + inner))
         self._velocity = velocity
-        self._clipped_steps += self._is_clipped
+        if self._is_clipped:
+            self._clipped_steps += 1
         return end
 
     def _stop(self, velocity: FloatArray) -> None:
@@ -346,17 +351,7 @@ class SimulatedArm:
 
 
 class Rollout(NamedTuple):
-    """
-    States on a time grid.
-
-    Attributes
-    ----------
-    times
-        Shape (m,) [s].
-    positions, velocities
-        Shape (m, n) [rad], [rad/s].
-
-    """
+    """States on a grid of times (m,) [s]: positions [rad] and velocities [rad/s], shape (m, n)."""
 
     times: FloatArray
     positions: FloatArray
