@@ -62,7 +62,7 @@ def _line(row: Row) -> str:
     if isinstance(default, bool):
         shown = f'`{str(default).lower()}`'
     else:
-        shown = f'`{default}`' if isinstance(default, str | float | int) else 'not set'
+        shown = f'`{default}`' if isinstance(default, str | float | int | list) else 'not set'
     meaning = row.description + (', *fixed*' if row.read_only else '')
     return f'| `{row.name}` | {shown} |{_allowed(row)}| {_escaped(meaning)} |\n'
 

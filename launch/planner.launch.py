@@ -31,7 +31,7 @@ PACKAGE = 'flat_planner_ros'
 BOOLEAN = ['true', 'false']
 
 FORMS = {'position': 'planner_position.yaml'}
-"""Parameter files for the form of the command, by interface of the controller."""
+"""Parameter files for the drive and the form of the command, by interface of the controller."""
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -66,7 +66,7 @@ def generate_launch_description() -> LaunchDescription:
                 'command_interface',
                 default_value='effort',
                 choices=['effort', 'position'],
-                description="of the arm's controller: position leaves efforts out of the command",
+                description="of the arm's controller: position sets drive, and leaves efforts out",
             ),
             DeclareLaunchArgument(
                 'command_topic',
@@ -104,12 +104,12 @@ def _nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes, with what the arguments change in the planner."""
     common = _common(LaunchConfiguration('overlay_file').perform(context))
     parameters = list(common.pop('parameters'))
-    planner = [*parameters]
     form = FORMS.get(LaunchConfiguration('command_interface').perform(context))
     if form is not None:
-        planner.append(
+        parameters.append(
             PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'ros2_control', form])
         )
+    planner = [*parameters]
     strategy = LaunchConfiguration('strategy').perform(context)
     if strategy:
         planner.append({'strategy': strategy})

@@ -20,6 +20,7 @@ from flat_planner_ros.core.insensitive.insensitivity import (
     Insensitivity,
     MAX_HALF_WIDTH,
     MAX_INSENSITIVITY,
+    MAX_PAYLOAD,
     Nominal,
     UncertaintyBox,
 )
@@ -39,6 +40,7 @@ __all__ = [
     'Insensitivity',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
+    'MAX_PAYLOAD',
     'Nominal',
     'predict_residual',
     'PredictedResidual',

@@ -80,6 +80,14 @@ class UncertaintyBox:
                 f'{MAX_PAYLOAD:g}, and {1.0 - MAX_HALF_WIDTH:.2g} of the inertia must be left'
             )
 
+    def __str__(self) -> str:
+        """Return the box in words."""
+        text = f'stiffness +-{100.0 * self.stiffness:g} %, damping +-{100.0 * self.damping:g} %'
+        low, high = (100.0 * (factor - 1.0) for factor in self.ranges[2])
+        if low == high == 0.0:
+            return text
+        return f'{text}, inertia of the last link {low:+.3g} to {high:+.3g} %'
+
     @property
     def ranges(self) -> tuple[Range, Range, Range]:
         """Factors on stiffness, damping and the last link's inertia."""

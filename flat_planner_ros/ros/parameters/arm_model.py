@@ -18,7 +18,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from flat_planner_ros.core.arm import displaced_com, NotFlat, PlanarArm, suggest_counterbalances
+from flat_planner_ros.core.arm import (
+    displaced_com,
+    Drive,
+    NotFlat,
+    PlanarArm,
+    suggest_counterbalances,
+)
 from flat_planner_ros.ros.parameters.row import (
     DOUBLE,
     DOUBLES,
@@ -32,6 +38,13 @@ from rclpy.parameter import Parameter
 MODEL_ROWS = [
     Row(
         'joints', NAMES, '', 'joint names in kinematic order, the passive one last', read_only=True
+    ),
+    Row(
+        'drive',
+        Drive.EFFORT,
+        '',
+        'what joint n-1 is given: an effort, or positions that a stiff servo follows',
+        read_only=True,
     ),
     Row('model.inertia_star', DOUBLES, 'kg m^2', 'reduced inertias I*_{n-1} and I*_n'),
     Row('model.link_length', DOUBLES, 'm', 'lengths of the links'),

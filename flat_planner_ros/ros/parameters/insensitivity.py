@@ -14,16 +14,19 @@
 
 """Parameters of the strategy `insensitive` and of the predicted residual."""
 
+from collections.abc import Sequence
+
 from flat_planner_ros.core.insensitive import (
     Criterion,
     DEFAULT_WEIGHT,
     Insensitivity,
     MAX_HALF_WIDTH,
     MAX_INSENSITIVITY,
+    MAX_PAYLOAD,
     Nominal,
     UncertaintyBox,
 )
-from flat_planner_ros.ros.parameters.row import Row, Values
+from flat_planner_ros.ros.parameters.row import InvalidParameter, Row, Values
 
 INSENSITIVITY_ROWS = [
     Row(
@@ -42,6 +45,22 @@ INSENSITIVITY_ROWS = [
         'the same of the damping',
         lower=0.0,
         upper=MAX_HALF_WIDTH,
+    ),
+    Row(
+        'insensitivity.inertia',
+        UncertaintyBox.inertia,
+        '',
+        "the same of the last link's inertia about its joint",
+        lower=0.0,
+        upper=MAX_HALF_WIDTH,
+    ),
+    Row(
+        'insensitivity.payload',
+        list(UncertaintyBox.payload),
+        '',
+        'least and most that the last link may carry, as shares of its inertia',
+        lower=-MAX_HALF_WIDTH,
+        upper=MAX_PAYLOAD,
     ),
     Row(
         'insensitivity.nominal',
@@ -105,7 +124,10 @@ def insensitivity_of(values: Values) -> Insensitivity:
     name = 'insensitivity'
     return Insensitivity(
         box=UncertaintyBox(
-            stiffness=values[f'{name}.stiffness'], damping=values[f'{name}.damping']
+            stiffness=values[f'{name}.stiffness'],
+            damping=values[f'{name}.damping'],
+            inertia=values[f'{name}.inertia'],
+            payload=_payload(values[f'{name}.payload']),
         ),
         nominal=Nominal(values[f'{name}.nominal']),
         criterion=Criterion(values[f'{name}.criterion']),
@@ -114,3 +136,12 @@ def insensitivity_of(values: Values) -> Insensitivity:
         max_residual=values[f'{name}.max_residual'],
         modes=values[f'{name}.modes'],
     )
+
+
+def _payload(shares: Sequence[float]) -> tuple[float, float]:
+    """Return the least and the most."""
+    if len(shares) != 2:
+        raise InvalidParameter(
+            f'insensitivity.payload needs two numbers, the least and the most, got {len(shares)}'
+        )
+    return shares[0], shares[1]

@@ -16,7 +16,7 @@
 
 from math import pi
 
-from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.arm import Drive, PlanarArm
 from flat_planner_ros.core.monitor import ActuatedJoints, MonitorSettings
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.row import InvalidParameter, Row, Values
@@ -82,7 +82,7 @@ def build(values: Values) -> MonitorSettings:
 
     """
     _, arm = arm_of(values)
-    frequency, damping_ratio = _expected(arm)
+    frequency, damping_ratio = _expected(arm, Drive(values['drive']))
     window = values['window']
     if frequency is not None and window * frequency < 1.0:
         raise InvalidParameter(
@@ -102,9 +102,9 @@ def build(values: Values) -> MonitorSettings:
     )
 
 
-def _expected(arm: PlanarArm) -> tuple[float | None, float | None]:
+def _expected(arm: PlanarArm, drive: Drive) -> tuple[float | None, float | None]:
     """Return the damped frequency [Hz] and damping ratio [-], none if the arm does not swing."""
-    mode = arm.natural_mode()
+    mode = arm.natural_mode(held=drive is Drive.POSITION)
     if mode.damped_frequency == 0.0:
         return None, None
     return mode.damped_frequency / (2 * pi), mode.damping_ratio

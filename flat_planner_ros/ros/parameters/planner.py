@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isqrt
 
-from flat_planner_ros.core.arm import FlatModel
+from flat_planner_ros.core.arm import Drive, FlatModel
 from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy
 from flat_planner_ros.core.planning import check_options, JointLimits, OnViolation, PlanningOptions
 from flat_planner_ros.core.session import SessionSettings, StartSource
@@ -279,6 +279,7 @@ def build(values: Values) -> PlannerSettings:
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
         insensitivity=insensitivity_of(values),
+        drive=Drive(values['drive']),
     )
     # What admits no motion is refused here and not at the next goal.
     check_options(arm, options)

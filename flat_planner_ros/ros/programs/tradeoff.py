@@ -148,9 +148,9 @@ def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
         p=planning.p,
         flat_model=FlatModel.EXACT,
         insensitivity=planning.insensitivity,
+        drive=planning.drive,
     )
-    box = planning.insensitivity.box
-    text = f'stiffness ±{100.0 * box.stiffness:g} %, damping ±{100.0 * box.damping:g} %'
+    text = str(planning.insensitivity.box).replace('+-', '±')
     return tradeoff_points(request, arm, wanted, stretches=options.stretch), text
 
 

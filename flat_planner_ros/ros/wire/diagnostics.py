@@ -311,12 +311,11 @@ def _residual_values(motion: Motion, *, with_advice: bool, with_baselines: bool)
         residual = residual_of_plan(motion.plan, motion.samples)
     except InvalidRequest:
         return {}  # an arm that does not oscillate leaves nothing to predict
-    box = residual.box
     values: dict[str, float | int | str | None] = {
         'predicted_residual': residual.nominal,
         'predicted_residual_worst': residual.worst,
-        'predicted_residual_box': f'stiffness +-{100.0 * box.stiffness:g} %, '
-        f'damping +-{100.0 * box.damping:g} %',
+        'predicted_residual_box': str(residual.box),
+        'predicted_miss_worst': residual.miss or None,
         'advice': duration_advice(motion.plan, residual) if with_advice else None,
     }
     if with_baselines:

@@ -14,11 +14,22 @@
 
 """Insensitive motions and the predicted residual through the planner node."""
 
+from dataclasses import replace
 from math import pi
 
 from core.conftest import ARM, envelope
 from diagnostic_msgs.msg import DiagnosticStatus
-from flat_planner_ros.core import EffortProfile, FlatPlannerError, rollout
+from flat_planner_ros.core import (
+    EffortProfile,
+    FlatPlannerError,
+    MotionRequest,
+    plan,
+    PlanningOptions,
+    residual_of_plan,
+    rollout,
+    Strategy,
+)
+from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 import numpy as np
 import pytest
@@ -139,3 +150,27 @@ def test_an_arm_that_does_not_oscillate_has_no_predicted_residual(graph):
     assert 'predicted_residual' not in verdict
     with pytest.raises(FlatPlannerError, match='does not oscillate'):
         graph.create(PlannerNode, {**REST, **model, 'strategy': 'insensitive'})
+
+
+def test_a_servo_has_predictions_and_laws_of_its_own(graph):
+    options = PlanningOptions(strategy=Strategy.INSENSITIVE, drive=Drive.POSITION)
+    request = MotionRequest(start=np.zeros(2), final=np.array([pi, 0.0]), duration=1.0)
+    expected = residual_of_plan(plan(request, ARM, options)).worst
+    other = residual_of_plan(plan(request, ARM, replace(options, drive=Drive.EFFORT))).worst
+    verdict = Resting(graph, strategy='insensitive', drive='position').send()
+    assert float(verdict['predicted_residual_worst']) == pytest.approx(expected, rel=1e-4)
+    assert 'predicted_miss_worst' not in verdict
+    assert abs(other - expected) > 5e-5
+
+
+def test_a_payload_is_weighed_and_may_miss_the_goal(graph):
+    payload = {'insensitivity.payload': [0.0, 0.5]}
+    verdict = Resting(graph, strategy='insensitive', **payload).send()
+    assert verdict['predicted_residual_box'] == (
+        'stiffness +-10 %, damping +-10 %, inertia of the last link +0 to +50 %'
+    )
+    both, last = ARM.inertia_star
+    miss = pi * 0.5 * last / (both + 0.5 * last)
+    assert float(verdict['predicted_miss_worst']) == pytest.approx(miss, rel=1e-3)
+    (result,) = graph.set_parameters('flat_planner', **{'insensitivity.payload': [0.5]})
+    assert 'two numbers' in result.reason

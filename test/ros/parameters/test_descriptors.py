@@ -34,6 +34,8 @@ WITHOUT_UNIT = {
     'weights.Q': 'each entry has another one',
     'insensitivity.stiffness': 'a share',
     'insensitivity.damping': 'a share',
+    'insensitivity.inertia': 'a share',
+    'insensitivity.payload': 'a share',
     'insensitivity.weight': 'a ratio of distances',
 }
 """Numbers that have no unit to state, with the reason."""

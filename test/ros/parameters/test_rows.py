@@ -15,7 +15,7 @@
 """What rows say, and that a node without parameters has the defaults of the core."""
 
 from dataclasses import fields
-from math import inf, isfinite, nan
+from math import inf, isfinite, nan, pi, sqrt
 
 from flat_planner_ros.core.arm import FlatModel
 from flat_planner_ros.core.insensitive import Insensitivity
@@ -59,6 +59,21 @@ def test_a_monitor_without_parameters_has_the_defaults_of_the_core():
     settings = read_settings(None, monitor.ROWS, monitor.build, node='flat_monitor')
     of_the_arm = ['arm', 'expected_frequency', 'expected_damping_ratio']
     assert_equal_but_for(of_the_arm, settings, MonitorSettings())
+
+
+def test_a_monitor_expects_the_resonance_of_the_drive():
+    for drive in ('effort', 'position'):
+        settings = read_settings(
+            None,
+            monitor.ROWS,
+            monitor.build,
+            node='flat_monitor',
+            overrides=[f'drive:={drive}'],
+        )
+        inertia = 3.3e-5 if drive == 'position' else 3.3e-5 * (6.4e-4 - 3.3e-5) / 6.4e-4
+        assert settings.expected_frequency == pytest.approx(
+            sqrt(3.0e-3 / inertia * (1.0 - settings.expected_damping_ratio**2)) / (2.0 * pi)
+        )
 
 
 def test_a_choice_is_a_member_of_its_enumeration():

@@ -179,6 +179,7 @@ def test_a_real_arm_gets_the_command_on_its_controllers_topic(launched):
         'include_passive_joint': False,
         'include_effort': False,
     }
+    assert all(parameters(record)['drive'] == 'position' for record in records.values())
     assert 'is not installed' not in launched.output
 
 
