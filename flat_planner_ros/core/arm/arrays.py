@@ -83,7 +83,19 @@ def check_number(
     lower: float = -inf,
     error: type[FlatPlannerError] = InvalidModel,
 ) -> None:
-    """Refuse a number that is not finite, or not above one bound, or below another."""
+    """
+    Refuse a number that is not finite, or not above one bound, or below another.
+
+    Parameters
+    ----------
+    name, value, unit
+        What an error calls it, the number, and its unit.
+    above, lower
+        It must be larger than the first and at least the second.
+    error
+        What is raised.
+
+    """
     if isfinite(value) and value > above and value >= lower:
         return
     if above > -inf:
