@@ -49,6 +49,7 @@ WINGS = {
 
 MESSAGES_ALLOWED = {
     'conversions.py': 'the one place for messages and core types',
+    'joint_states.py': 'the same for joint states, which come in many forms',
     'diagnostics.py': 'the same for verdicts and reports',
     '*_node.py': 'the types of its topics and services',
     'model_adoption.py': 'hears reports and answers a service for the planner node',

@@ -41,6 +41,7 @@ from flat_planner_ros.core.arm.errors import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
+from flat_planner_ros.core.arm.joint_merger import JointMerger, MERGING_TOLERANCE
 from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
 from flat_planner_ros.core.arm.planar_arm import Drive, NaturalMode, PlanarArm
 from flat_planner_ros.core.arm.samples import JointSample, SampledMotion
@@ -76,9 +77,11 @@ __all__ = [
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
+    'JointMerger',
     'JointSample',
     'LinkBody',
     'locked',
+    'MERGING_TOLERANCE',
     'NaturalMode',
     'NotFlat',
     'OutOfReach',

@@ -16,9 +16,12 @@
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from typing import TypeVar
 
 from flat_planner_ros.core.arm.arrays import FloatArray
 import numpy as np
+
+Number = TypeVar('Number', float, FloatArray)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
@@ -71,8 +74,7 @@ class SampledMotion:
         chords = np.diff(positions, axis=0) / steps
         first, last = (chords, chords) if velocities is None else (velocities[:-1], velocities[1:])
         # In the time u since the interval's start: q = ((a u + b) u + c) u + d.
-        cubic = (first + last - 2 * chords) / steps**2
-        square = (3 * chords - 2 * first - last) / steps
+        cubic, square = cubic_coefficients(steps, chords, first, last)
         nothing = np.zeros_like(chords)
         # Positions and velocities side by side, highest power first, shape (m-1, 4, 2 n).
         self._coefficients = np.concatenate(
@@ -93,3 +95,27 @@ class SampledMotion:
         both = ((a * u + b) * u + c) * u + d
         n = self._rest.size
         return both[:n], both[n:]
+
+
+def cubic_coefficients(
+    step: Number, chord: Number, first: Number, last: Number
+) -> tuple[Number, Number]:
+    """
+    Return the coefficients of the third and second power of the cubic Hermite interpolant.
+
+    Parameters
+    ----------
+    step
+        Length of the interval [s].
+    chord
+        Mean velocity over it [rad/s].
+    first, last
+        Velocities at its ends [rad/s].
+
+    Returns
+    -------
+    tuple
+        [rad/s^3] and [rad/s^2].
+
+    """
+    return (first + last - 2 * chord) / step**2, (3 * chord - 2 * first - last) / step

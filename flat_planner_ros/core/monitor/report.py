@@ -18,7 +18,13 @@ from dataclasses import dataclass
 from enum import Enum
 from math import sqrt
 
-from flat_planner_ros.core.arm import check_number, FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import (
+    check_number,
+    FloatArray,
+    InvalidRequest,
+    MERGING_TOLERANCE,
+    PlanarArm,
+)
 from flat_planner_ros.core.monitor.identification import (
     ActuatedJoints,
     identify,
@@ -54,6 +60,8 @@ class MonitorSettings:
     timeout
         Silence after which the measurement is stale, and backward step of time from which the
         clock counts as reset [s].
+    merging_tolerance
+        Distance in time within which all joints of a sample that comes in parts were heard [s].
     expected_frequency
         Damped frequency expected of the oscillation [Hz], or ``None``.
     expected_damping_ratio
@@ -70,6 +78,7 @@ class MonitorSettings:
     amplitude_error: float = 5e-2
     settling_band: float = 5e-3
     timeout: float = 0.5
+    merging_tolerance: float = MERGING_TOLERANCE
     expected_frequency: float | None = None
     expected_damping_ratio: float | None = None
     arm: PlanarArm | None = None

@@ -54,6 +54,7 @@ def motion_start(
     last: FloatArray | None,
     stamp: float | None,
     now: float,
+    lack: str = '',
 ) -> MotionStart:
     """
     Return where a motion starts: at rest, or spliced to what is planned.
@@ -72,6 +73,8 @@ def motion_start(
         Absolute time at which it is to start [s]; None for as soon as possible.
     now
         Present time [s].
+    lack
+        Why there is no present state, if that is known: a clause for the refusal.
 
     Raises
     ------
@@ -83,7 +86,7 @@ def motion_start(
     check_stamp(stamp, now)
     if not timeline.is_busy(now):
         time = now + settings.start_delay if stamp is None else stamp
-        return MotionStart(time, _pose_at_rest(settings, measured, last, now))
+        return MotionStart(time, _pose_at_rest(settings, measured, last, now, lack))
     if not settings.is_stamped:
         raise RequestRejected(
             Reason.BUSY,
@@ -98,11 +101,12 @@ def _pose_at_rest(
     measured: JointSample | None,
     last: FloatArray | None,
     now: float,
+    lack: str,
 ) -> FloatArray:
     """Return the pose from which a motion starts at rest, checked against what is measured."""
     timeout = settings.joint_state_timeout
     if settings.start_source in (StartSource.AUTO, StartSource.MEASURED):
-        measured = _fresh(measured, timeout, now)
+        measured = _fresh(measured, timeout, now, lack)
         pose = np.append(measured.positions[:-1], 0.0)
     else:
         if settings.start_source is StartSource.PARAMETER:
@@ -116,7 +120,7 @@ def _pose_at_rest(
             )
         if measured is None:
             return pose
-        measured = _fresh(measured, timeout, now)
+        measured = _fresh(measured, timeout, now, lack)
     _check_at_rest(settings, measured, pose)
     return pose
 
@@ -213,17 +217,18 @@ def check_stamp(stamp: float | None, now: float) -> None:
         )
 
 
-def _fresh(measured: JointSample | None, limit: float, now: float) -> JointSample:
+def _fresh(measured: JointSample | None, limit: float, now: float, lack: str) -> JointSample:
     """Return the measured state unless there is none, or only an old one."""
     if measured is None:
         raise RequestRejected(
-            Reason.START_STATE_UNKNOWN, 'no joint state of this arm has been received yet'
+            Reason.START_STATE_UNKNOWN, lack or 'no joint state of this arm has been received yet'
         )
     age = now - measured.time
     if not -limit <= age <= limit:
         raise RequestRejected(
             Reason.START_STATE_STALE,
             f'the last joint state is {age:.3f} s old, more than {limit:g} s'
+            f'{": " if lack else ""}{lack}'
             if age > 0.0
             else f'the last joint state is stamped {-age:.3f} s ahead of the present: do the '
             f'planner and its source go by the same clock (use_sim_time)?',

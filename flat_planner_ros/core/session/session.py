@@ -19,7 +19,12 @@ from dataclasses import replace
 from enum import Enum
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import InvalidRequest, JointSample, OutOfReach, UncertifiedPlan
+from flat_planner_ros.core.arm import (
+    InvalidRequest,
+    JointSample,
+    OutOfReach,
+    UncertifiedPlan,
+)
 from flat_planner_ros.core.planning import (
     LimitUse,
     MotionRequest,
@@ -81,11 +86,18 @@ class PlannerSession:
     settings
         Valid for the goals to come.
 
+    Attributes
+    ----------
+    lack
+        Why joint states that come in parts give no present sample, a clause; to be set by whoever
+        reads them. Empty where they do.
+
     """
 
     def __init__(self, settings: SessionSettings) -> None:
         """Start at rest, without a measurement."""
         self.settings = settings
+        self.lack = ''
         self._measured: JointSample | None = None
         self._timeline = Timeline()
         self._motion: Motion | None = None
@@ -265,7 +277,9 @@ class PlannerSession:
     def _start(self, stamp: float | None, now: float) -> MotionStart:
         """Return where a motion starts."""
         last = None if self._motion is None else self._motion.plan.request.final
-        return motion_start(self.settings, self._timeline, self._measured, last, stamp, now)
+        return motion_start(
+            self.settings, self._timeline, self._measured, last, stamp, now, self.lack
+        )
 
 
 def _check_time(now: float) -> None:

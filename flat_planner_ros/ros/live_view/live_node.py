@@ -18,11 +18,12 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest
+from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, JointSample
 from flat_planner_ros.ros.live_view.feed import Feed
 from flat_planner_ros.ros.live_view.page_settings import (
     checked_value,
@@ -31,6 +32,7 @@ from flat_planner_ros.ros.live_view.page_settings import (
     SETTINGS,
 )
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -105,7 +107,7 @@ class LiveNode(Node):
         self.feed.put('namespace', self.get_namespace())
         self.feed.put('choices', choices())
         self._joints: list[str] = []
-        self._reader: conversions.JointStateReader | None = None
+        self._readers: dict[str, JointStateReader] = {}
         self._epoch: float | None = None
         self._last = dict.fromkeys(STREAMS, 0.0)
         self._verdicts: deque[dict[str, Any]] = deque(maxlen=VERDICTS)
@@ -176,23 +178,30 @@ class LiveNode(Node):
         """Return the callback of a stream, which reads only what will be shown."""
 
         def receive(data: bytes) -> None:
-            now = monotonic()
-            if now - self._last[stream] >= ROW_PERIOD:
-                self._last[stream] = now
+            reader = self._readers.get(stream)
+            is_due = monotonic() - self._last[stream] >= ROW_PERIOD
+            # Of joint states in parts every message counts.
+            if is_due or (reader is not None and reader.is_in_parts):
                 self._on_state(stream, deserialize_message(data, JointState))
 
         return receive
 
     def _on_state(self, stream: str, msg: JointState) -> None:
+        """Add a row, unless the last one is too near."""
+        if not self._joints:
+            self._use_joints(msg.name)
+        reader = self._readers[stream]
+        with suppress(FlatPlannerError):
+            for sample in reader.read(msg, lambda: stamps.now(self.get_clock())):
+                now = monotonic()
+                if now - self._last[stream] >= ROW_PERIOD:
+                    self._last[stream] = now
+                    self._show(stream, sample)
+        for remark in reader.take_remarks():
+            self.get_logger().warning(remark)
+
+    def _show(self, stream: str, sample: JointSample) -> None:
         """Add a row: time, positions, velocities and efforts, NaN where unknown."""
-        if not stamps.is_stamped(msg):
-            msg.header.stamp = self.get_clock().now().to_msg()
-        if self._reader is None or not self._joints:
-            self._reader = self._use_joints(msg.name)
-        try:
-            sample = self._reader.read(msg)
-        except FlatPlannerError:
-            return
         time = self._relative(sample.time)
         unknown = [float('nan')] * len(self._joints)
         values = (sample.positions, sample.velocities, sample.efforts)
@@ -208,7 +217,7 @@ class LiveNode(Node):
         except FlatPlannerError:
             return
         if tuple(self._joints) != motion.joint_names:
-            self._reader = self._use_joints(motion.joint_names)
+            self._use_joints(motion.joint_names)
         plan = {
             'start': self._relative(motion.start),
             'end': self._relative(motion.end),
@@ -243,12 +252,12 @@ class LiveNode(Node):
             }
             self.feed.put('report', report)
 
-    def _use_joints(self, names: Sequence[str]) -> conversions.JointStateReader:
-        """Show these joints from now on; return their reader."""
+    def _use_joints(self, names: Sequence[str]) -> None:
+        """Show these joints from now on."""
         self._joints = list(names)
+        self._readers = {stream: JointStateReader(names) for stream in STREAMS}
         self.feed.restart()
         self.feed.put('joints', list(names))
-        return conversions.JointStateReader(self._joints)
 
     def _relative(self, time: float) -> float:
         """Return a time from the origin of the page's axis, a new one if time has gone back."""
@@ -279,9 +288,13 @@ class LiveNode(Node):
         known = dict(zip(names, map(parameter_value_to_python, values), strict=False))
         self.feed.put(f'settings of {node}', known)
         if node == interfaces.PLANNER:
-            lengths = (await client.get_parameters(['model.link_length'])).values
+            answers = (await client.get_parameters(['model.link_length', 'joints'])).values
             # Empty where the model is reduced: it has no lengths for the last two links.
-            self.feed.put('links', [list(value.double_array_value) for value in lengths][:1])
+            self.feed.put('links', [list(value.double_array_value) for value in answers[:1]])
+            # A message may have named a part of them only.
+            joints = [name for value in answers[1:] for name in value.string_array_value]
+            if joints and joints != self._joints:
+                self._use_joints(joints)
         self._asked.pop(node, None)
 
     async def _carry_out(self, command: Any) -> tuple[bool, str]:

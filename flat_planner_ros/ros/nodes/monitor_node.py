@@ -19,7 +19,7 @@ import sys
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.core.arm import FlatPlannerError, JointSample
 from flat_planner_ros.core.monitor import (
     MonitorSettings,
     PlannedMotion,
@@ -35,9 +35,11 @@ from flat_planner_ros.ros.parameters.monitor import build, ROWS
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -104,13 +106,15 @@ class MonitorNode(Node):
         """Wait for a plan, as at the start."""
         self._monitor.reset()
         self._stamps = StampClock()
-        self._reader: conversions.JointStateReader | None = None
+        self._reader: JointStateReader | None = None
         self._plan: PlannedMotion | None = None
         self._report: VibrationReport | None = None
 
     def _apply(self, settings: MonitorSettings) -> None:
         """Judge with changed parameters from now on."""
         self._monitor.settings = settings
+        if self._reader is not None:
+            self._reader.tolerance = settings.merging_tolerance
 
     def _on_plan(self, data: bytes) -> None:
         """Take a plan, for whatever joints it names."""
@@ -121,32 +125,39 @@ class MonitorNode(Node):
             return
         if self._plan is None or self._plan.joint_names != motion.joint_names:
             self._forget()
-            self._reader = conversions.JointStateReader(motion.joint_names)
+            self._reader = JointStateReader(
+                motion.joint_names, self._monitor.settings.merging_tolerance
+            )
         self._plan = motion
         self._publish_reports(self._monitor.watch(motion))
 
     def _on_measured(self, msg: JointState) -> None:
-        """Take a sample and tell how far it is from the plan."""
+        """Take what a message completes."""
         if self._reader is None:
             return
-        if not stamps.is_stamped(msg):
-            msg.header.stamp = self.get_clock().now().to_msg()
         try:
-            sample = self._reader.read(msg)
-            reports = self._monitor.add(sample)
+            for sample in self._reader.read(msg, self._now):
+                self._take(sample, msg.header, self._reader.joints)
         except FlatPlannerError as error:
             self._watch.heard_other_part()
             self.get_logger().warning(
                 f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
             )
             return
+        if self._reader.is_in_parts:
+            self._watch.heard_other_part()
+        for remark in self._reader.take_remarks():
+            self.get_logger().warning(remark)
+
+    def _take(self, sample: JointSample, header: Header, joints: Sequence[str]) -> None:
+        """Take a sample and tell how far it is from the plan."""
+        reports = self._monitor.add(sample)
         self._stamps.stamp = sample.time
         if self._residual.get_subscription_count():
             residual = self._monitor.residual(sample)
             if residual is not None:
-                self._residual.publish(
-                    conversions.residual_msg(msg.header, self._reader.joints, residual)
-                )
+                header = stamps.header_at(header, sample.time)
+                self._residual.publish(conversions.residual_msg(header, joints, residual))
         self._publish_reports(reports)
 
     def _on_status(self, msg: DiagnosticArray) -> None:

@@ -32,6 +32,7 @@ from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -49,7 +50,7 @@ class PlannerNode(Node):
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
-        self._reader = conversions.JointStateReader(self._joints)
+        self._reader = JointStateReader(self._joints, self._settings.merging_tolerance)
         self._sent_start: float | None = None
         self._open_publishers()
         self._listen()
@@ -119,17 +120,24 @@ class PlannerNode(Node):
     def _apply(self, settings: PlannerSettings) -> None:
         """Plan the next goals with changed parameters."""
         self._session.settings = settings.session
+        self._reader.tolerance = settings.merging_tolerance
         self._efforts.configure(settings.stream_effort, settings.session.period)
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
         try:
-            self._session.measure(self._reader.read(msg))
+            for sample in self._reader.read(msg, self._now):
+                self._session.measure(sample)
         except FlatPlannerError as error:
             self._watch.heard_other_part()
             self.get_logger().warning(
                 f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
             )
+        if self._reader.is_in_parts:
+            self._watch.heard_other_part()
+            self._session.lack = self._reader.lack
+        for remark in self._reader.take_remarks():
+            self.get_logger().warning(remark)
 
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Plan the last goal again."""

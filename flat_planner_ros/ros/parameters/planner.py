@@ -25,7 +25,13 @@ from flat_planner_ros.core.planning import check_options, JointLimits, OnViolati
 from flat_planner_ros.core.session import SessionSettings, StartSource
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
-from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row, Values
+from flat_planner_ros.ros.parameters.row import (
+    DOUBLES,
+    InvalidParameter,
+    JOINT_STATES_TOLERANCE,
+    Row,
+    Values,
+)
 import numpy as np
 
 
@@ -45,6 +51,8 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
+    merging_tolerance
+        Distance in time within which all joints of a sample that comes in parts were heard [s].
     include_passive_joint, include_effort
         Form of the command.
     reference_rate
@@ -59,6 +67,7 @@ class PlannerSettings:
     """
 
     session: SessionSettings
+    merging_tolerance: float
     include_passive_joint: bool
     include_effort: bool
     reference_rate: float
@@ -191,6 +200,7 @@ ROWS = [
         'age from which a joint state is stale',
         lower=0.0,
     ),
+    JOINT_STATES_TOLERANCE,
     Row(
         'start_delay',
         SessionSettings.start_delay,
@@ -306,6 +316,7 @@ def build(values: Values) -> PlannerSettings:
     )
     return PlannerSettings(
         session=session,
+        merging_tolerance=values[JOINT_STATES_TOLERANCE.name],
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
         reference_rate=values['reference_rate'],

@@ -90,8 +90,9 @@ def main(args: Sequence[str] | None = None) -> int:
             joint_states=options.joint_states,
         )
         settings = _settings(options, recording, sources)
-        judgements = replay(recording, sources, settings)
-        _tell(options, recording, sources, judgements)
+        remarks: list[str] = []
+        judgements = replay(recording, sources, settings, remarks.append)
+        _tell(options, recording, sources, judgements, remarks)
         if options.plot is not None:
             _draw(judgements, options.plot)
     except (FlatPlannerError, OSError) as error:
@@ -153,6 +154,7 @@ def _tell(
     recording: 'Recording',
     sources: 'Sources',
     judgements: Sequence['Judgement'],
+    remarks: Sequence[str],
 ) -> None:
     """Print the reports."""
     reports = [_as_dict(judgement) for judgement in judgements]
@@ -163,6 +165,7 @@ def _tell(
             'plan': sources.plan,
             'joint_states': sources.joint_states,
             'damage': recording.damage,
+            'remarks': list(remarks),
             'reports': reports,
         }
         print(json.dumps(document, indent=2, allow_nan=False))
@@ -170,6 +173,8 @@ def _tell(
     print(f'{options.file}: plans from {sources.plan}, joint states from {sources.joint_states}')
     if recording.damage:
         print(f'the recording is cut short or damaged: {recording.damage}')
+    for remark in remarks:
+        print(remark)
     if not reports:
         print('no motion to report on')
     for number, (report, difference) in enumerate(zip(reports, differences, strict=True), 1):

@@ -32,6 +32,7 @@ from flat_planner_ros.figures.paper_example import (
 )
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
@@ -345,8 +346,8 @@ def _goal(start: float) -> JointTrajectory:
 
 def _recording(states: Sequence[JointState], start: float) -> Recording:
     """Return the joint states of one run on the time axis of its motion."""
-    reader = conversions.JointStateReader(EXAMPLE_ARM['joints'])
-    samples = [reader.read(state) for state in states]
+    reader = JointStateReader(EXAMPLE_ARM['joints'])
+    samples = [sample for state in states for sample in reader.read(state, lambda: 0.0)]
     return Recording(
         times=np.array([sample.time for sample in samples]) - start,
         positions=np.array([sample.positions for sample in samples]),

@@ -23,6 +23,7 @@ from typing import Any
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.ros.recording.recording import PARAMETERS, RecordingWriter
 from flat_planner_ros.ros.wire import interfaces
+from flat_planner_ros.ros.wire.joint_states import NO_STAMP
 from flat_planner_ros.ros.wire.message_types import definition, message_class, UnknownType
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -73,6 +74,9 @@ SHARED = {
 }
 """Other topics that are recorded."""
 
+STAMP = slice(4, 12)
+"""Bytes of a serialised message with a header that are its stamp, after those of the format."""
+
 
 class RecordingFailed(FlatPlannerError):
     """The file cannot be opened; the message says why."""
@@ -117,6 +121,7 @@ class RecorderNode(Node):
         self._path = path
         self._everything = everything
         self.failure = ''
+        self._said_unstamped = False
         try:
             self._writer = RecordingWriter(path, overwrite=overwrite)
         except FileExistsError as error:
@@ -193,8 +198,12 @@ class RecorderNode(Node):
         self, topic: str, kind: str, schema: str, quality: QoSProfile
     ) -> Callable[[bytes], None]:
         """Return the callback of a topic."""
+        is_measured = topic == self.resolve_topic_name(interfaces.JOINT_STATES)
 
         def write(message: bytes) -> None:
+            if is_measured and not any(message[STAMP]) and not self._said_unstamped:
+                self._said_unstamped = True
+                self.get_logger().warning(f'{NO_STAMP} from the recording')
             if not self._writer.knows(topic):
                 infos = self.get_publishers_info_by_topic(topic)
                 offered = [info.qos_profile for info in infos] or [quality]

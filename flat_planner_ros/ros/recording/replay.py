@@ -14,7 +14,7 @@
 
 """A monitor that is fed from a recording, and its reports."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import json
@@ -31,9 +31,11 @@ from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.recording.recording import Entry, Recording
 from flat_planner_ros.ros.wire import conversions, stamps
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, PLAN, PLANNER, topic_of
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.message_types import message_class
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -115,17 +117,26 @@ def find_sources(
 def recorded_settings(recording: Recording, sources: Sources) -> list[tuple[int, MonitorSettings]]:
     """Return the monitor's settings as recorded, each with the time from which it held [ns]."""
     namespace = sources.plan.removesuffix('/' + topic_of(PLANNER, PLAN))
+    # A recording of an earlier version does not know all of them.
+    defaults = {
+        row.name: row.default
+        for row in monitor_parameters.ROWS
+        if not isinstance(row.default, Parameter.Type)
+    }
     known = {row.name for row in monitor_parameters.ROWS}
     settings = []
     for time, node, text in recording.parameters:
         if node == f'{namespace}/{MONITOR}':
             values = {k: v for k, v in json.loads(text).items() if k in known}
-            settings.append((time, monitor_parameters.build(values)))
+            settings.append((time, monitor_parameters.build({**defaults, **values})))
     return settings
 
 
 def replay(
-    recording: Recording, sources: Sources, settings: Sequence[tuple[int, MonitorSettings]]
+    recording: Recording,
+    sources: Sources,
+    settings: Sequence[tuple[int, MonitorSettings]],
+    remark: Callable[[str], object] = lambda text: None,
 ) -> list[Judgement]:
     """
     Return a report on each motion that a recording shows, as the monitor node makes it.
@@ -138,9 +149,11 @@ def replay(
         Topics with both.
     settings
         At least one; each holds from its time on [ns], the first from the start.
+    remark
+        Is told what is remarkable about the joint states, each once.
 
     """
-    player = _Player(settings[0][1])
+    player = _Player(settings[0][1], remark)
     changes = list(settings[1:])
     for entry in recording.entries({sources.plan, sources.joint_states}):
         while changes and changes[0][0] <= entry.time:
@@ -157,22 +170,21 @@ class _Player:
     A recorder may have been late where the joint states were not.
     """
 
-    def __init__(self, settings: MonitorSettings) -> None:
+    def __init__(self, settings: MonitorSettings, remark: Callable[[str], object]) -> None:
         self.monitor = VibrationMonitor(settings)
+        self._remark = remark
         self.judgements: list[Judgement] = []
         self._stamp: float | None = None
-        self._reader: conversions.JointStateReader | None = None
+        self._reader: JointStateReader | None = None
         self._motions: list[PlannedMotion] = []
         self._samples: list[JointSample] = []
 
     def take(self, entry: Entry) -> None:
         """Take a message; one that cannot be used is left out, as in the node."""
         msg = deserialize_message(entry.message, message_class(entry.kind))
-        if not stamps.is_stamped(msg):
-            msg.header.stamp = stamps.time_msg(entry.time / NANOSECONDS)
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
         with suppress(FlatPlannerError):
-            take(msg)
+            take(msg, entry.time / NANOSECONDS)
 
     def end(self) -> None:
         """Judge a motion that is still watched: nothing more will come."""
@@ -180,24 +192,29 @@ class _Player:
             silence = SILENCE * self.monitor.settings.timeout
             self._keep(self.monitor.tick(self._stamp + silence))
 
-    def _take_plan(self, msg: Any) -> None:
-        """Take a plan, for whatever joints it names."""
+    def _take_plan(self, msg: Any, arrival: float) -> None:
+        """Take a plan that arrived then [s], for whatever joints it names."""
+        if not stamps.is_stamped(msg):
+            msg.header.stamp = stamps.time_msg(arrival)
         motion = conversions.planned_motion_from_trajectory(msg)
         if self._reader is None or tuple(self._reader.joints) != motion.joint_names:
             self.monitor.reset()
-            self._reader = conversions.JointStateReader(motion.joint_names)
+            self._reader = JointStateReader(motion.joint_names)
             self._samples.clear()
         self._motions.append(motion)
         self._keep(self.monitor.watch(motion))
 
-    def _take_state(self, msg: Any) -> None:
-        """Take a joint state."""
+    def _take_state(self, msg: Any, arrival: float) -> None:
+        """Take a joint state that arrived then [s]."""
         if self._reader is None:
             return
-        sample = self._reader.read(msg)
-        self._stamp = sample.time
-        self._samples.append(sample)
-        self._keep(self.monitor.add(sample))
+        self._reader.tolerance = self.monitor.settings.merging_tolerance
+        for sample in self._reader.read(msg, lambda: arrival):
+            self._stamp = sample.time
+            self._samples.append(sample)
+            self._keep(self.monitor.add(sample))
+        for text in self._reader.take_remarks():
+            self._remark(text)
 
     def _keep(self, reports: Sequence[VibrationReport]) -> None:
         """Keep reports, each with its motion and samples."""

@@ -18,7 +18,7 @@ from array import array
 from collections.abc import Sequence
 from typing import TypeVar
 
-from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidRequest, JointSample
+from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidRequest
 from flat_planner_ros.core.monitor import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
@@ -27,7 +27,6 @@ from flat_planner_ros.ros.wire import stamps
 from flat_planner_ros.ros.wire.point_reader import FIELDS, PointTable, read_points
 from flat_planner_ros.ros.wire.point_writer import trajectory_bytes
 import numpy as np
-from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
@@ -142,59 +141,6 @@ def _goal_message(data: bytes, message_type: type[Message]) -> Message:
             Reason.INVALID_GOAL, f'the goal cannot be read: {_first_line(error)}'
         ) from error
     return message
-
-
-class JointStateReader:
-    """
-    Reads joint states of a source that names its joints in the same order every time.
-
-    Names are looked up once, and compared as a whole from then on: at 1 kHz that counts.
-
-    Parameters
-    ----------
-    joints
-        Joints whose states are wanted, in this order.
-
-    """
-
-    def __init__(self, joints: Sequence[str]) -> None:
-        self.joints = list(joints)
-        self._names: list[str] | None = None
-        self._indices: NDArray[np.intp] | slice = slice(None)
-
-    def read(self, msg: JointState) -> JointSample:
-        """
-        Return a measured state in the order of the arm's joints.
-
-        The arrays of the sample may be views of the message's.
-
-        Parameters
-        ----------
-        msg
-            Joints by name, in any order, perhaps with others among them; velocity and effort may
-            be empty or NaN.
-
-        Raises
-        ------
-        InvalidRequest
-            A joint is missing or the arrays do not fit the names.
-
-        """
-        names = msg.name
-        if names != self._names:
-            self._indices = (
-                slice(None) if names == self.joints else joint_indices(names, self.joints)
-            )
-            self._names = names
-        count = len(names)
-        if len(msg.position) != count:
-            raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
-        return JointSample(
-            time=stamps.seconds(msg.header.stamp),
-            positions=np.frombuffer(msg.position)[self._indices],
-            velocities=_optional(msg.velocity, count, self._indices),
-            efforts=_optional(msg.effort, count, self._indices),
-        )
 
 
 def planned_motion_from_trajectory(msg: JointTrajectory) -> PlannedMotion:
@@ -373,12 +319,3 @@ def _optional_table(points: PointTable, field: str) -> FloatArray | None:
     if field in points.fields and not points.fields[field].shape[1]:
         return None
     return _table(points, field)
-
-
-def _optional(
-    values: 'array[float]', count: int, indices: NDArray[np.intp] | slice
-) -> FloatArray | None:
-    """Return the wanted entries of an array that may be empty."""
-    if len(values) != count:
-        return None
-    return np.frombuffer(values)[indices]

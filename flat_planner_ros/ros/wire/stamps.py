@@ -18,6 +18,7 @@ from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from rclpy.clock import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 
 def seconds(time: Time | Duration) -> float:
@@ -48,6 +49,13 @@ def sec_and_nanosec(time: float) -> tuple[int, int]:
     sec, fraction = divmod(time, 1.0)
     carry, nanosec = divmod(round(fraction * NANOSECONDS), NANOSECONDS)
     return int(sec) + carry, nanosec
+
+
+def header_at(header: Header, time: float) -> Header:
+    """Return a header of an absolute time [s], the given one if it is of that time."""
+    if seconds(header.stamp) == time:
+        return header
+    return Header(stamp=time_msg(time), frame_id=header.frame_id)
 
 
 def is_stamped(msg: JointState) -> bool:

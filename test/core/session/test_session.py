@@ -509,6 +509,16 @@ def test_without_a_measurement_there_is_no_start():
     assert error.reason is Reason.START_STATE_UNKNOWN
 
 
+def test_what_joint_states_in_parts_lack_is_the_reason_of_a_refusal():
+    planner = PlannerSession(SETTINGS)
+    planner.lack = 'joint2 has not been heard on joint_states; heard: joint1'
+    assert str(reason_of(planner.submit, GOAL, NOW)) == planner.lack
+    planner.measure(sample())
+    error = reason_of(planner.submit, GOAL, NOW + 0.6)
+    assert error.reason is Reason.START_STATE_STALE
+    assert str(error).endswith(f'more than 0.5 s: {planner.lack}')
+
+
 def test_an_old_measurement_is_stale():
     error = reason_of(session().submit, GOAL, NOW + 0.6)
     assert error.reason is Reason.START_STATE_STALE

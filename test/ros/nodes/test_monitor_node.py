@@ -32,6 +32,7 @@ from flat_planner_ros.core.monitor import (
 )
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
@@ -416,7 +417,8 @@ def test_joint_states_that_lack_a_joint_are_ignored_with_one_warning(graph, benc
         return msg
 
     bench.plan(plan_msg())
-    bench.feed(START + 0.1, form=interrupted)
+    bench.feed(START)  # before, a part would be one of several that make a whole
+    bench.feed(START + 0.1, since=START + 0.02, form=interrupted)
     bench.feed(START + DURATION + WINDOW, since=START + 0.12)
     assert float(bench.report()[2]['amplitude']) == pytest.approx(AMPLITUDE, rel=1e-6)
     graph.expect(lambda: graph.logged('joint state ignored'), 'a warning')
@@ -610,24 +612,30 @@ def test_a_wrong_parameter_ends_the_process_with_one_line(graph):
         assert words in complaints[0]
 
 
+def never():
+    """Return no time of arrival: the message has a stamp."""
+    raise AssertionError('the stamp counts')
+
+
 def test_a_reader_gives_the_sample_of_every_form_of_message():
-    reader = conversions.JointStateReader(JOINTS)
+    reader = JointStateReader(JOINTS)
     forms = [lambda msg: msg, _shuffled, _shuffled, _bare, _bare, lambda msg: msg]
     for i, form in enumerate(forms):
         time = START + DURATION + 0.25 + i
         plain = state_msg(time)
-        sample = reader.read(form(state_msg(time)))
+        (sample,) = reader.read(form(state_msg(time)), never)
         assert sample.time == time
         assert sample.positions.tolist() == plain.position.tolist()
-        again = conversions.JointStateReader(JOINTS).read(form(state_msg(time)))
+        (again,) = JointStateReader(JOINTS).read(form(state_msg(time)), never)
         for name in ('positions', 'velocities', 'efforts'):
             np.testing.assert_equal(getattr(sample, name), getattr(again, name))
         assert (sample.velocities is None) == (sample.efforts is None) == (form is _bare)
-    with pytest.raises(InvalidRequest, match='no joint joint2'):
-        reader.read(JointState(name=['joint1'], position=[0.0]))
+    with pytest.raises(InvalidRequest, match='no joint joint1, joint2 among wheel'):
+        reader.read(JointState(name=['wheel'], position=[0.0]), never)
     with pytest.raises(InvalidRequest, match='1 positions for 2'):
-        reader.read(JointState(name=list(JOINTS), position=[0.0]))
-    assert reader.read(state_msg(START)).positions.shape == (2,)
+        reader.read(JointState(name=list(JOINTS), position=[0.0]), never)
+    assert reader.read(state_msg(START), never)[0].positions.shape == (2,)
+    assert not reader.take_remarks()
 
 
 def test_a_residual_crosses_the_border_and_back():
@@ -638,7 +646,7 @@ def test_a_residual_crosses_the_border_and_back():
         msg = conversions.residual_msg(header, list(JOINTS), residual)
         assert msg.header == header
         assert not msg.effort
-        sample = conversions.JointStateReader(JOINTS).read(msg)
+        (sample,) = JointStateReader(JOINTS).read(msg, never)
         assert sample.time == 1.7e9 + 0.25
         np.testing.assert_equal(sample.positions, residual.positions)
         np.testing.assert_equal(sample.velocities, velocities)

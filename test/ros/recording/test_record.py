@@ -31,7 +31,7 @@ from flat_planner_ros.ros.wire.message_types import definition, message_class, U
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from ros.rig import goal, values
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -43,7 +43,11 @@ highlevel = pytest.importorskip('rosbags.highlevel')
 
 from flat_planner_ros.ros.programs import analyse  # noqa: E402, I100  They need it.
 from flat_planner_ros.ros.recording.recorder_node import RecorderNode  # noqa: E402
-from flat_planner_ros.ros.recording.recording import Recording, UnreadableRecording  # noqa: E402
+from flat_planner_ros.ros.recording.recording import (  # noqa: E402
+    Recording,
+    RecordingWriter,
+    UnreadableRecording,
+)
 from mcap.reader import make_reader  # noqa: E402
 
 OURS = {
@@ -414,6 +418,37 @@ def test_a_bag_of_another_storage_with_other_names_is_analysed(graph, tmp_path, 
     assert report['values']['start_time'] == float(values(reports[0])['start_time'])
     assert report['values']['samples'] > 0
     assert 'frequency_expected' not in report['values']
+
+
+def test_recorded_joint_states_in_parts_without_stamps_are_analysed(tmp_path, capsys):
+    path = tmp_path / 'parts.mcap'
+    writer = RecordingWriter(path)
+    for topic, kind in (('/flat_planner/plan', JointTrajectory), ('/joint_states', JointState)):
+        name = f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
+        writer.add_topic(topic, name, definition(name), [interfaces.RELIABLE])
+    writer.write('/flat_planner/plan', round(START * 1e9), serialize_message(plan()))
+    for k in range(round((MOTION + WINDOW) / PERIOD) + 2):
+        whole = swinging(k * PERIOD)
+        for name, position in zip(whole.name, whole.position, strict=True):
+            part = JointState(name=[name], position=[position])
+            arrival = round((START + k * PERIOD) * 1e9)
+            writer.write('/joint_states', arrival, serialize_message(part))
+    writer.close()
+    assert analyse.main(['analyse', str(path), '--json', '--window', str(WINDOW)]) == 0
+    document = json.loads(capsys.readouterr().out)
+    (report,) = document['reports']
+    assert report['values']['amplitude'] == pytest.approx(SWING, rel=1e-3)
+    assert len(document['remarks']) == 3
+    assert 'joint states have no stamp: the time of their arrival is taken' in document['remarks']
+
+
+def test_a_recorder_says_that_joint_states_have_no_stamp(graph, tmp_path):
+    recorder = record(graph, tmp_path / 'a.mcap')
+    for _ in range(3):
+        graph.publish('/joint_states', JointState(name=['joint1'], position=[0.0]))
+    graph.expect(lambda: ' 3 messages' in recorder.summary, 'the messages')
+    graph.expect(lambda: graph.logged('have no stamp'), 'a warning')
+    assert len(graph.logged('have no stamp')) == 1
 
 
 def test_a_motion_is_drawn(graph, tmp_path):

@@ -1,0 +1,180 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The one way from messages of joint states to samples of an arm, whatever drivers send."""
+
+from array import array
+from collections.abc import Callable, Sequence
+from math import inf
+
+from flat_planner_ros.core.arm import (
+    FloatArray,
+    InvalidRequest,
+    JointMerger,
+    JointSample,
+    MERGING_TOLERANCE,
+)
+from flat_planner_ros.core.monitor import joint_indices
+from flat_planner_ros.ros.wire import stamps
+import numpy as np
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+
+Places = NDArray[np.intp] | slice
+"""Where wanted joints stand in the arrays of a message."""
+
+MOST_PARTS = 16
+"""Lists of names that are remembered; sources repeat theirs."""
+
+NO_STAMP = 'joint states have no stamp: the time of their arrival is taken'
+"""Remark on stamps of 0, which mean "now" to most of ROS."""
+
+WHOLE = 1.0
+"""Time around a message with all joints in which parts say nothing new [s]."""
+
+
+class JointStateReader:
+    """
+    Reads joint states of one source that names all joints, or of several with some each.
+
+    Names are looked up once, and compared as a whole from then on: at 1 kHz that counts.
+
+    Parameters
+    ----------
+    joints
+        Joints whose states are wanted, in this order.
+    tolerance
+        Distance in time within which all joints of a sample that comes in parts were heard [s].
+
+    """
+
+    def __init__(self, joints: Sequence[str], tolerance: float = MERGING_TOLERANCE) -> None:
+        self.joints = list(joints)
+        self._merger = JointMerger(joints, tolerance)
+        self._names: list[str] | None = None
+        self._layout: tuple[Places, list[int] | None] = (slice(None), None)
+        self._known: dict[tuple[str, ...], tuple[Places, list[int] | None]] = {}
+        self._remarks: dict[str, bool] = {}
+        self._whole = -inf
+
+    @property
+    def tolerance(self) -> float:
+        """Distance in time within which all joints were heard [s]; may be set at any time."""
+        return self._merger.tolerance
+
+    @tolerance.setter
+    def tolerance(self, tolerance: float) -> None:
+        self._merger.tolerance = tolerance
+
+    @property
+    def is_in_parts(self) -> bool:
+        """Tell whether the last message named some of the joints only."""
+        return self._layout[1] is not None
+
+    @property
+    def lack(self) -> str:
+        """Return why parts give no present sample, a clause; empty where they do."""
+        return self._merger.lack
+
+    def take_remarks(self) -> list[str]:
+        """Return what is remarkable about the messages, a sentence each, each once."""
+        new = [remark for remark, is_told in self._remarks.items() if not is_told]
+        self._remarks.update(dict.fromkeys(new, True))
+        return new
+
+    def read(self, msg: JointState, arrival: Callable[[], float]) -> list[JointSample]:
+        """
+        Return measured states in the order of the arm's joints.
+
+        The arrays of a sample may be views of the message's.
+
+        Parameters
+        ----------
+        msg
+            Joints by name, in any order, perhaps with others among them; velocity and effort may
+            be empty or NaN.
+        arrival
+            Tells when the message has come [s]; asked where its stamp is 0.
+
+        Returns
+        -------
+        list of JointSample
+            One for a message with all joints; for a part, those that are complete with it.
+
+        Raises
+        ------
+        InvalidRequest
+            None of the joints is named, or some are beside messages that name all, or the arrays
+            do not fit the names.
+
+        """
+        names = msg.name
+        if names != self._names:
+            self._layout = self._layout_of(names)
+            self._names = names
+        places, part = self._layout
+        count = len(names)
+        if len(msg.position) != count:
+            raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
+        sample = JointSample(
+            time=stamps.seconds(msg.header.stamp) or self._arrived(arrival),
+            positions=np.frombuffer(msg.position)[places],
+            velocities=_optional(msg.velocity, count, places),
+            efforts=_optional(msg.effort, count, places),
+        )
+        if part is None:
+            self._whole = sample.time
+            return [sample]
+        if abs(sample.time - self._whole) <= WHOLE:
+            joint_indices(names, self.joints)  # refuses it
+        named = ', '.join(self.joints[index] for index in part)
+        self._remark(
+            f'joint states come in parts ({named} by itself): they are merged within '
+            f'joint_states.tolerance {self.tolerance:g} s'
+        )
+        return self._merger.add(part, sample)
+
+    def _layout_of(self, names: list[str]) -> tuple[Places, list[int] | None]:
+        """Return where a message with these names has the joints, and which if not all."""
+        key = tuple(names)
+        if key not in self._known:
+            if len(self._known) == MOST_PARTS:
+                self._known.clear()
+            self._known[key] = self._looked_up(names)
+        return self._known[key]
+
+    def _looked_up(self, names: list[str]) -> tuple[Places, list[int] | None]:
+        """Return the layout of a message with these names."""
+        if names == self.joints:
+            return slice(None), None
+        there = [name for name in self.joints if name in names] or self.joints
+        places = joint_indices(names, there)
+        if len(there) == len(self.joints):
+            return places, None
+        return places, [self.joints.index(name) for name in there]
+
+    def _arrived(self, arrival: Callable[[], float]) -> float:
+        """Return the time of arrival of a message without a stamp."""
+        self._remark(NO_STAMP)
+        return arrival()
+
+    def _remark(self, remark: str) -> None:
+        """Keep a remark that is new."""
+        self._remarks.setdefault(remark, False)
+
+
+def _optional(values: 'array[float]', count: int, places: Places) -> FloatArray | None:
+    """Return the wanted entries of an array that may be empty."""
+    if len(values) != count:
+        return None
+    return np.frombuffer(values)[places]

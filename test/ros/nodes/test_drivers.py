@@ -1,0 +1,135 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Drivers as they are: joint states in parts, without stamps, from several publishers."""
+
+from math import pi
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
+from flat_planner_ros.ros.nodes.planner_node import PlannerNode
+from flat_planner_ros.ros.wire import interfaces, stamps
+import numpy as np
+import pytest
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+STATES = '/joint_states'
+START, DURATION, WINDOW = 100.0, 0.5, 2.0
+AMPLITUDE, FREQUENCY = 0.02, 1.7
+
+
+def goal(angle=pi, duration=1.0):
+    """Return a goal for joint 1."""
+    point = JointTrajectoryPoint(
+        positions=[float(angle)], time_from_start=stamps.duration_msg(duration)
+    )
+    return JointTrajectory(joint_names=['joint1'], points=[point])
+
+
+def values(msg):
+    """Return a message's only status as a dictionary, with its message."""
+    (status,) = msg.status
+    return {**{pair.key: pair.value for pair in status.values}, 'message': status.message}
+
+
+class Drivers:
+    """A planner and the drivers of an arm, each of which publishes by itself."""
+
+    def __init__(self, graph, **parameters):
+        """Start the planner."""
+        self.graph = graph
+        self.node = graph.create(PlannerNode, parameters)
+        self.status = graph.collect(
+            DiagnosticArray, '/flat_planner/status', interfaces.LATCHED_HISTORY
+        )
+
+    def publish(self, stamp=None, **positions):
+        """Publish a joint state of now, or with a stamp of one's own."""
+        msg = JointState(name=list(positions), position=list(positions.values()))
+        now = stamps.now(self.node.get_clock())
+        msg.header.stamp = stamps.time_msg(now if stamp is None else stamp)
+        self.graph.publish(STATES, msg)
+
+    def send(self, message):
+        """Send a goal and return the values of the next thing that the planner says."""
+        count = len(self.status)
+        self.graph.publish('/flat_planner/goal', message)
+        self.graph.expect(lambda: len(self.status) > count, 'a verdict')
+        return values(self.status[count])
+
+
+def test_goals_start_from_joint_states_in_parts(graph):
+    drivers = Drivers(graph)
+    drivers.publish(joint1=0.25)
+    graph.expect(lambda: graph.logged('joint states come in parts'), 'the first part')
+    refusal = drivers.send(goal())
+    assert refusal['error_name'] == 'START_STATE_UNKNOWN'
+    assert refusal['message'] == ('joint2 has not been heard on joint_states; heard: joint1')
+    drivers.publish(joint2=0.0)
+    drivers.publish(joint1=0.25)
+    graph.expect(lambda: drivers.node._session.measured, 'a sample')
+    assert drivers.send(goal())['state'] == 'ACCEPTED'
+
+
+def test_a_goal_starts_from_a_joint_state_without_a_stamp(graph):
+    drivers = Drivers(graph)
+    for _ in range(3):
+        drivers.publish(stamp=0.0, joint1=0.25, joint2=0.0)
+    graph.expect(lambda: drivers.node._session.measured, 'a sample')
+    assert drivers.send(goal())['state'] == 'ACCEPTED'
+    assert len(graph.logged('joint states have no stamp')) == 1
+
+
+def plan():
+    """Return a cubic motion of joint 1 to 1 rad."""
+    msg = JointTrajectory(joint_names=['joint1', 'joint2'])
+    msg.header.stamp = stamps.time_msg(START)
+    for s in np.linspace(0.0, 1.0, 51).tolist():
+        point = JointTrajectoryPoint(time_from_start=stamps.duration_msg(s * DURATION))
+        point.positions = [s**2 * (3 - 2 * s), 0.0]
+        point.velocities = [6 * s * (1 - s) / DURATION, 0.0]
+        msg.points.append(point)
+    return msg
+
+
+def test_the_monitor_judges_joint_states_in_parts(graph):
+    """Joint 1 at 50 Hz and joint 2, which swings by a known amplitude, at 100 Hz."""
+    monitor = graph.create(MonitorNode, {'window': WINDOW, 'timeout': 60.0})
+    reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
+    graph.publish('/flat_planner/plan', plan(), interfaces.LATCHED)
+    graph.expect(lambda: monitor._plan, 'the plan')
+    residuals = graph.collect(JointState, '/flat_monitor/residual')
+
+    def told(time, name, position):
+        msg = JointState(name=[name], position=[position])
+        msg.header.stamp = stamps.time_msg(time)
+        graph.publish(STATES, msg)
+
+    told(START, 'joint1', 0.0)
+    for k in range(round((DURATION + WINDOW) * 50) + 3):
+        time = START + k / 50
+        for fast in (time, time + 0.01):
+            elapsed = fast - START - DURATION
+            swing = AMPLITUDE * np.cos(2 * pi * FREQUENCY * elapsed) if elapsed >= 0.0 else 0.0
+            told(fast, 'joint2', float(swing))
+        s = min((time - START + 0.02) / DURATION, 1.0)
+        told(time + 0.02, 'joint1', s**2 * (3 - 2 * s))
+        graph.expect(lambda n=2 * k: len(residuals) > n, 'two residuals')
+    graph.expect(lambda: reports, 'a report')
+    report = values(reports[0])
+    assert float(report['amplitude']) == pytest.approx(AMPLITUDE, rel=1e-3)
+    assert float(report['frequency']) == pytest.approx(FREQUENCY, rel=1e-3)
+    assert int(report['samples']) == pytest.approx(100 * WINDOW, abs=3)
+    assert len(graph.logged('joint states come in parts')) == 2
