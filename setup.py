@@ -109,6 +109,7 @@ setup(
             'monitor_node = flat_planner_ros.programs:monitor_node',
             'record = flat_planner_ros.programs:record',
             'analyse = flat_planner_ros.programs:analyse',
+            'identify = flat_planner_ros.programs:identify',
             'live_view = flat_planner_ros.programs:live_view',
             'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.programs:make_urdf',

@@ -81,6 +81,11 @@ def analyse() -> int:
     return _run_tool('programs.analyse')
 
 
+def identify() -> int:
+    """Fit a model to recordings."""
+    return _run_tool('programs.identify')
+
+
 def paper_table() -> int:
     """Carry out the paper's experiment."""
     return _run('programs.paper_table', INTERRUPTED)

@@ -92,7 +92,7 @@ def read_settings(
         name, separator, text = override.partition(ASSIGNMENT)
         if not (separator and name and text):
             raise InvalidParameter(f'an override is written name:=value, got {override!r}')
-        given[name] = _parsed(text, f'the value of {name}')
+        given[name] = parsed(text, f'the value of {name}')
     refuse_unknown(given, [row.name for row in rows], warn)
     defaults = model_defaults(given)
     values = {}
@@ -113,7 +113,7 @@ def _from_file(path: Path, node: str) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, 'strerror', None) or 'not a text file'
         raise InvalidParameter(f'cannot read {path}: {reason}') from error
-    content = _parsed(text, str(path))
+    content = parsed(text, str(path))
     if not isinstance(content, Mapping):
         raise InvalidParameter(f'{path} is no parameter file: it has no block for any node')
     values: dict[str, Any] = {}
@@ -123,7 +123,7 @@ def _from_file(path: Path, node: str) -> dict[str, Any]:
     return values
 
 
-def _parsed(text: str, source: str) -> Any:
+def parsed(text: str, source: str) -> Any:
     """Return YAML as Python values."""
     try:
         return yaml.load(text, _Loader)

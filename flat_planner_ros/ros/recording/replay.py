@@ -107,8 +107,8 @@ def find_sources(
     """
     usual = topic_of(PLANNER, PLAN)
     return Sources(
-        plan=_find(recording, JOINT_TRAJECTORY, plan, namespace, usual, '--plan'),
-        joint_states=_find(
+        plan=find_topic(recording, JOINT_TRAJECTORY, plan, namespace, usual, '--plan'),
+        joint_states=find_topic(
             recording, JOINT_STATE, joint_states, namespace, JOINT_STATES, '--joint-states'
         ),
     )
@@ -239,7 +239,7 @@ class _Player:
         )
 
 
-def _find(
+def find_topic(
     recording: Recording, kind: str, given: str, namespace: str, usual: str, option: str
 ) -> str:
     """Return the one topic of a type by its given or its usual name."""

@@ -1,0 +1,102 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A parameter file with the model that was fitted, as the nodes read it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from flat_planner_ros.core.arm import FlatPlannerError, PlanarArm
+from flat_planner_ros.core.model_fit import ModelFit
+from flat_planner_ros.ros.parameters.parameter_file import parsed
+import numpy as np
+import yaml
+
+DIGITS = 8
+"""Significant digits of a written number."""
+
+
+class UnwritableModel(FlatPlannerError):
+    """A model that the form of the parameter file cannot say; the message names the remedy."""
+
+
+def write_fitted(source: Path, fit: ModelFit, before: PlanarArm, target: Path) -> None:
+    """
+    Write a parameter file anew with another model, everything else as it was.
+
+    Parameters
+    ----------
+    source
+        File with the model from which the fit started.
+    fit
+        What was found; stands in the comment at the head.
+    before
+        The arm of the source.
+    target
+        File to write.
+
+    Raises
+    ------
+    UnwritableModel
+        The file has no model, or its form cannot say what was found.
+    OSError
+        The file cannot be written.
+
+    """
+    tree = parsed(source.read_text('utf-8'), str(source))
+    blocks = list(_with_model(tree))
+    if not blocks:
+        raise UnwritableModel(f'{source} has no block with model: to be changed')
+    for block in blocks:
+        _change(block, fit.arm, before)
+    head = ''.join(f'# {line}\n' for line in ('The model was fitted:', *fit.text.splitlines()))
+    body = yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=100)
+    target.write_text(head + '\n' + body, 'utf-8')
+
+
+def _with_model(tree: Any) -> Iterator[dict[str, Any]]:
+    """Return the blocks that hold a model."""
+    if isinstance(tree, dict):
+        if isinstance(tree.get('model'), dict):
+            yield tree
+        for value in tree.values():
+            yield from _with_model(value)
+
+
+def _change(block: dict[str, Any], arm: PlanarArm, before: PlanarArm) -> None:
+    """Put the values of an arm into a block."""
+    model = block['model']
+    model['stiffness'], model['damping'] = _rounded([arm.stiffness, arm.damping])
+    block['friction'] = {
+        'viscous': _rounded(arm.viscous_friction),
+        'coulomb': _rounded(arm.coulomb_friction),
+    }
+    if 'inertia_star' in model:
+        model['inertia_star'] = _rounded(arm.inertia_star)
+        return
+    # The full form: what is more or less sits at the links' own centres of mass.
+    inertia = np.array(model['link_inertia'], dtype=float)
+    inertia[-2:] += np.diag(arm.inertia - before.inertia)[-2:]
+    if inertia.min() < 0.0:
+        raise UnwritableModel(
+            f'link_inertia would be {inertia.tolist()} kg m^2: the masses or centres of mass of '
+            'the last two links are too large; give them by model.inertia_star instead'
+        )
+    model['link_inertia'] = _rounded(inertia)
+
+
+def _rounded(values: Any) -> list[float]:
+    """Return numbers with the digits that are written."""
+    return [float(f'{value:.{DIGITS}g}') for value in values]
