@@ -35,10 +35,11 @@ BENCHMARKS = (
     'stream',
     'via_points',
     'duration',
+    'model_fit',
 )
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration')
+WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration', 'model_fit')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'

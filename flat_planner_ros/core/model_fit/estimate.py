@@ -113,5 +113,8 @@ class ModelFit:
             f'{self.noise[1]:.2g} rad'
         )
         verdict = f'the model does not explain the motion: {self.misfit}' if self.misfit else ''
+        scale = f'true efforts are {self.effort_scale:.6g} times those measured'
         lines = [estimate.text for estimate in self.estimates] + [left, verdict]
+        if self.effort_scale != 1.0:
+            lines.insert(0, scale)
         return '\n'.join(filter(None, lines))

@@ -77,6 +77,16 @@ def test_a_recording_becomes_a_parameter_file(tmp_path, capsys):
     assert f'# {printed.splitlines()[0]}' in fitted.read_text('utf-8')
 
 
+def test_a_trusted_inertia_is_kept(tmp_path, capsys):
+    bag = tmp_path / 'a.mcap'
+    write(bag)
+    options = ['--params-file', str(SHIPPED), '--trust', 'inertia']
+    assert identify.main(['identify', str(bag), str(bag), *options]) == 0
+    scale = BELIEVED.inertia_star.both / TRUE.inertia_star.both
+    said = float(capsys.readouterr().out.split()[3])
+    assert said == pytest.approx(scale, rel=1e-3)
+
+
 def test_a_recording_without_efforts_is_refused_with_the_reason(tmp_path, capsys):
     bag = tmp_path / 'a.mcap'
     write(bag, with_efforts=False)
