@@ -28,7 +28,13 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parent.parent / 'test'))
 from recorded_arm import recorded  # noqa: E402  It is a part of the tests.
 
-SENSORS = ((200.0, 0.0, 0), (200.0, 1e-4, 14), (200.0, 1e-3, 12), (50.0, 1e-4, 14), (50.0, 1e-3, 12))
+SENSORS = (
+    (200.0, 0.0, 0),
+    (200.0, 1e-4, 14),
+    (200.0, 1e-3, 12),
+    (50.0, 1e-4, 14),
+    (50.0, 1e-3, 12),
+)
 """Rates [Hz], noise [rad] and bits of the encoders."""
 
 OFF = (0.1, 0.3)
@@ -42,7 +48,9 @@ def sections(options: Namespace) -> list[Section]:
     """Return the table; `options.seconds` is the number of random arms."""
     rows = [_row(sensors, max(1, int(options.seconds))) for sensors in SENSORS]
     header = ('rate, noise, encoder', 'median error', '90 %', 'within 2 std', 'misfit said', 'CPU')
-    return [Section('Model fit: worst of six parameters, random arms 10 to 30 % off', header, rows, [])]
+    return [
+        Section('Model fit: worst of six parameters, random arms 10 to 30 % off', header, rows, [])
+    ]
 
 
 def _row(sensors: tuple[float, float, int], cases: int) -> tuple[object, ...]:
