@@ -27,11 +27,8 @@ from flat_planner_ros.core.monitor.identification import (
 )
 from flat_planner_ros.core.monitor.motion_record import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
-from flat_planner_ros.core.monitor.report import (
-    Level,
-    MonitorSettings,
-    VibrationReport,
-)
+from flat_planner_ros.core.monitor.report import VibrationReport
+from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 from flat_planner_ros.core.monitor.vibration_monitor import VibrationMonitor
 
 __all__ = [

@@ -12,93 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a monitor tolerates, and its report on what a motion leaves behind."""
+"""The report on what a motion leaves behind."""
 
 from dataclasses import dataclass
-from enum import Enum
 from math import sqrt
 
-from flat_planner_ros.core.arm import (
-    check_number,
-    FloatArray,
-    InvalidRequest,
-    MERGING_TOLERANCE,
-    PlanarArm,
-)
-from flat_planner_ros.core.monitor.identification import (
-    ActuatedJoints,
-    identify,
-    StiffnessEstimate,
-)
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
+from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 import numpy as np
-
-
-class Level(Enum):
-    """Severity of a report."""
-
-    OK = 'ok'
-    WARN = 'warn'
-    ERROR = 'error'
-    STALE = 'stale'
-
-
-@dataclass(frozen=True, kw_only=True)
-class MonitorSettings:
-    """
-    What a monitor looks at and what it tolerates.
-
-    Attributes
-    ----------
-    window
-        Time after the motion that is judged [s]; several periods.
-    amplitude_ok, amplitude_error
-        Largest amplitude that is fine, and largest that is no error [rad].
-    settling_band
-        Deviation from the final position that counts as settled [rad].
-    timeout
-        Silence after which the measurement is stale, and backward step of time from which the
-        clock counts as reset [s].
-    merging_tolerance
-        Distance in time within which all joints of a sample that comes in parts were heard [s].
-    expected_frequency
-        Damped frequency expected of the oscillation [Hz], or ``None``.
-    expected_damping_ratio
-        Its damping ratio [-], or ``None``.
-    arm
-        Nominal model whose stiffness and damping are estimated, or ``None`` for no estimate.
-    actuated_joints
-        Whether the actuated joints are free or held after a motion.
-
-    """
-
-    window: float = 3.0
-    amplitude_ok: float = 5e-3
-    amplitude_error: float = 5e-2
-    settling_band: float = 5e-3
-    timeout: float = 0.5
-    merging_tolerance: float = MERGING_TOLERANCE
-    expected_frequency: float | None = None
-    expected_damping_ratio: float | None = None
-    arm: PlanarArm | None = None
-    actuated_joints: ActuatedJoints = ActuatedJoints.AUTO
-
-    def __post_init__(self) -> None:
-        """Refuse settings without meaning."""
-        units = {'window': 's', 'amplitude_ok': 'rad', 'settling_band': 'rad', 'timeout': 's'}
-        for name, unit in units.items():
-            check_number(name, getattr(self, name), unit, above=0.0, error=InvalidRequest)
-        if not self.amplitude_error >= self.amplitude_ok:
-            raise InvalidRequest(
-                f'amplitude_error {self.amplitude_error} rad is below amplitude_ok '
-                f'{self.amplitude_ok} rad'
-            )
-        frequency, ratio = self.expected_frequency, self.expected_damping_ratio
-        if frequency is not None:
-            check_number('expected_frequency', frequency, 'Hz', above=0.0, error=InvalidRequest)
-        if ratio is not None and not 0.0 <= ratio < 1.0:
-            raise InvalidRequest(f'expected damping ratio must be in [0, 1), got {ratio}')
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,7 +19,8 @@ from math import inf, isfinite, nan
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, JointSample
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record, Residual
-from flat_planner_ros.core.monitor.report import assess, MonitorSettings, VibrationReport
+from flat_planner_ros.core.monitor.report import assess, VibrationReport
+from flat_planner_ros.core.monitor.settings import MonitorSettings
 import numpy as np
 
 JUMP = 0.2

@@ -25,7 +25,7 @@ from flat_planner_ros.core.monitor.motion_record import (
     Record,
     RECORD_LIMIT,
 )
-from flat_planner_ros.core.monitor.report import Level, MonitorSettings
+from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 from flat_planner_ros.core.monitor.vibration_monitor import Phase, VibrationMonitor
 import numpy as np
 import pytest

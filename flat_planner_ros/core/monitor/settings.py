@@ -1,0 +1,92 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a monitor looks at, what it tolerates, and how severe its reports can be."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from flat_planner_ros.core.arm import (
+    check_number,
+    InvalidRequest,
+    MERGING_TOLERANCE,
+    PlanarArm,
+)
+from flat_planner_ros.core.monitor.identification import ActuatedJoints
+
+
+class Level(Enum):
+    """Severity of a report."""
+
+    OK = 'ok'
+    WARN = 'warn'
+    ERROR = 'error'
+    STALE = 'stale'
+
+
+@dataclass(frozen=True, kw_only=True)
+class MonitorSettings:
+    """
+    What a monitor looks at and what it tolerates.
+
+    Attributes
+    ----------
+    window
+        Time after the motion that is judged [s]; several periods.
+    amplitude_ok, amplitude_error
+        Largest amplitude that is fine, and largest that is no error [rad].
+    settling_band
+        Deviation from the final position that counts as settled [rad].
+    timeout
+        Silence after which the measurement is stale, and backward step of time from which the
+        clock counts as reset [s].
+    merging_tolerance
+        Distance in time within which all joints of a sample that comes in parts were heard [s].
+    expected_frequency
+        Damped frequency expected of the oscillation [Hz], or ``None``.
+    expected_damping_ratio
+        Its damping ratio [-], or ``None``.
+    arm
+        Nominal model whose stiffness and damping are estimated, or ``None`` for no estimate.
+    actuated_joints
+        Whether the actuated joints are free or held after a motion.
+
+    """
+
+    window: float = 3.0
+    amplitude_ok: float = 5e-3
+    amplitude_error: float = 5e-2
+    settling_band: float = 5e-3
+    timeout: float = 0.5
+    merging_tolerance: float = MERGING_TOLERANCE
+    expected_frequency: float | None = None
+    expected_damping_ratio: float | None = None
+    arm: PlanarArm | None = None
+    actuated_joints: ActuatedJoints = ActuatedJoints.AUTO
+
+    def __post_init__(self) -> None:
+        """Refuse settings without meaning."""
+        units = {'window': 's', 'amplitude_ok': 'rad', 'settling_band': 'rad', 'timeout': 's'}
+        for name, unit in units.items():
+            check_number(name, getattr(self, name), unit, above=0.0, error=InvalidRequest)
+        if not self.amplitude_error >= self.amplitude_ok:
+            raise InvalidRequest(
+                f'amplitude_error {self.amplitude_error} rad is below amplitude_ok '
+                f'{self.amplitude_ok} rad'
+            )
+        frequency, ratio = self.expected_frequency, self.expected_damping_ratio
+        if frequency is not None:
+            check_number('expected_frequency', frequency, 'Hz', above=0.0, error=InvalidRequest)
+        if ratio is not None and not 0.0 <= ratio < 1.0:
+            raise InvalidRequest(f'expected damping ratio must be in [0, 1), got {ratio}')
