@@ -31,6 +31,9 @@ SYMMETRY_TOLERANCE = 1e-12
 COUPLING_TOLERANCE = 1e-9
 """Largest miss of h_ij = l_i s_j, relative to sqrt(h_ii h_jj) [-]."""
 
+DRAWN_LENGTH = 0.1
+"""Length of link n-1 where the model does not tell, for two joints or without a tip mass [m]."""
+
 
 class Load(NamedTuple):
     """Inertia (n, n) [kg m^2], static moment (n,) [kg m] and carried mass (n,) [kg]."""
@@ -146,10 +149,6 @@ def check_realizable(
                 f'beyond it in proportion to their static moments, relative miss {miss:.3g}, '
                 f'bound {COUPLING_TOLERANCE:g}'
             )
-
-
-DRAWN_LENGTH = 0.1
-"""Length of link n-1 where the model does not tell, for two joints or without a tip mass [m]."""
 
 
 class LinkBody(NamedTuple):

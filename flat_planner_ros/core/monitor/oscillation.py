@@ -53,6 +53,21 @@ FIT_TOLERANCE = 1e-13
 MAX_EVALUATIONS = 60
 """Most evaluations of one refinement [-]."""
 
+UNKNOWNS = 6
+"""Bias, slope, two amplitudes, frequency and decay [-]."""
+
+MIN_SAMPLES = 2 * UNKNOWNS
+"""Fewest samples for the unknowns and an idea of the noise [-]."""
+
+MIN_PERIODS = 1.0
+"""Fewest periods in the samples for which a frequency is claimed [-]."""
+
+FALSE_ALARM = 1e-5
+"""Probability with which white noise is taken for an oscillation [-]."""
+
+LATE_LIMIT = 3.0
+"""Largest decay between the end of the motion and the first sample, as exponent [-]."""
+
 
 def basis_columns(u: FloatArray, rates: FloatArray) -> FloatArray:
     """Return the linear unknowns' columns for rates (w, s) per unit of u: (m, 4)."""
@@ -156,22 +171,6 @@ def _separable(
         return q @ (q.T @ slopes) - slopes
 
     return residual, jacobian
-
-
-UNKNOWNS = 6
-"""Bias, slope, two amplitudes, frequency and decay [-]."""
-
-MIN_SAMPLES = 2 * UNKNOWNS
-"""Fewest samples for the unknowns and an idea of the noise [-]."""
-
-MIN_PERIODS = 1.0
-"""Fewest periods in the samples for which a frequency is claimed [-]."""
-
-FALSE_ALARM = 1e-5
-"""Probability with which white noise is taken for an oscillation [-]."""
-
-LATE_LIMIT = 3.0
-"""Largest decay between the end of the motion and the first sample, as exponent [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,6 +24,12 @@ from flat_planner_ros.core.monitor.oscillation import fit_oscillation, Oscillati
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 import numpy as np
 
+EFFORT_GAP = 0.1
+"""Longest hole in the measured efforts that their RMS forgives, relative to the motion [-]."""
+
+WINDOW_GAP = 0.1
+"""Longest delay of the first sample after the motion left unsaid, relative to the window [-]."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VibrationReport:
@@ -84,13 +90,6 @@ class VibrationReport:
     def is_settled(self) -> bool:
         """Return whether the passive joint came to rest within the window."""
         return self.settling_time is not None
-
-
-EFFORT_GAP = 0.1
-"""Longest hole in the measured efforts that their RMS forgives, relative to the motion [-]."""
-
-WINDOW_GAP = 0.1
-"""Longest delay of the first sample after the motion left unsaid, relative to the window [-]."""
 
 
 def assess(
