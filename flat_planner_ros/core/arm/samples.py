@@ -96,6 +96,15 @@ class SampledMotion:
         n = self._rest.size
         return both[:n], both[n:]
 
+    def acceleration_at(self, time: float) -> FloatArray:
+        """Return the acceleration, which may jump at the points, shape (n,) [rad/s^2]."""
+        after = bisect_right(self._times, time)
+        if after == 0 or after == len(self._times):
+            return self._rest
+        slope, start = self._coefficients[after - 1][1:3, self._rest.size :]
+        acceleration: FloatArray = 2.0 * slope * (time - self._times[after - 1]) + start
+        return acceleration
+
 
 def cubic_coefficients(
     step: Number, chord: Number, first: Number, last: Number

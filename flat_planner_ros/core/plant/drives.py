@@ -12,14 +12,61 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the motors of an arm apply: commanded effort, feedback, their limits, and the weight."""
+"""What the motors of an arm apply: commanded effort, feedback, servos, limits, and the weight."""
 
-from math import inf
+from dataclasses import dataclass
+from math import inf, pi
 
 from flat_planner_ros.core.arm import FloatArray, InvalidModel, PlanarArm
 from flat_planner_ros.core.plant.effort_profile import JointReference
 import numpy as np
 import numpy.typing as npt
+
+STIFFEST = 0.5
+"""Rate at which an ideal servo removes the error of the integration, in terms of the step [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Servo:
+    """
+    Servos that make the actuated joints follow positions, whatever effort it takes.
+
+    Attributes
+    ----------
+    bandwidth
+        Of the critically damped second order in which a joint follows its reference [Hz]; 0 for
+        an ideal servo, whose joints are where they should be.
+    step
+        Integration step of the arm [s].
+
+    Raises
+    ------
+    InvalidModel
+        If the bandwidth has no meaning, or the steps are too long for it.
+
+    """
+
+    bandwidth: float = 0.0
+    step: float = 1e-3
+
+    def __post_init__(self) -> None:
+        """Refuse what could not be integrated."""
+        most = STIFFEST / (2.0 * pi * self.step)
+        if not 0.0 <= self.bandwidth <= most:
+            raise InvalidModel(
+                f'servo.bandwidth must be in [0, {most:.4g}] Hz with steps of {self.step:g} s, '
+                f'got {self.bandwidth:g} Hz: take shorter steps, or 0 for an ideal servo'
+            )
+
+    def acceleration(self, reference: JointReference, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return what the servos give their joints, shape (n-1,) [rad/s^2]."""
+        error, rate = reference.position - q[:-1], dq[:-1]
+        if self.bandwidth > 0.0:
+            own = 2.0 * pi * self.bandwidth
+            return own**2 * error - 2.0 * own * rate
+        own = STIFFEST / self.step
+        lag = reference.velocity - rate
+        return reference.acceleration + own**2 * error + 2.0 * own * lag
 
 
 class Drives:
@@ -38,6 +85,8 @@ class Drives:
     feedback_p, feedback_d
         Gains on position and velocity errors, shape (n-1,) [N m/rad], [N m s/rad]; zeros by
         default. They act where a command has positions.
+    servo
+        What follows positions in the place of efforts and feedback, if anything does.
 
     Raises
     ------
@@ -53,6 +102,7 @@ class Drives:
         saturation: npt.ArrayLike | None = None,
         feedback_p: npt.ArrayLike | None = None,
         feedback_d: npt.ArrayLike | None = None,
+        servo: Servo | None = None,
     ) -> None:
         """Apply nothing but what carries the weight."""
         motors = arm.n - 1
@@ -61,11 +111,18 @@ class Drives:
         self._feedback_d = _per_motor('feedback_d', feedback_d, motors, 0.0, 'N m s/rad')
         self._is_limited = bool(np.isfinite(self._saturation).any())
         self.has_feedback = bool(self._feedback_p.any() or self._feedback_d.any())
+        self.servo = servo
+        """What follows positions."""
         self.arm = arm
         """What they move; may be replaced."""
         nothing, missing = np.zeros(motors), np.full(motors, np.nan)
-        self.idle = JointReference(nothing, missing, missing)
+        self.idle = JointReference(nothing, missing, missing, missing)
         """What stands for no command; its arrays are known by being these very ones."""
+
+    @property
+    def follows_positions(self) -> bool:
+        """Whether the positions of a command matter."""
+        return self.has_feedback or self.servo is not None
 
     def feed_forward(self, reference: JointReference, q: FloatArray) -> FloatArray:
         """Return what is applied without looking at errors, shape (n-1,) [N m]."""
@@ -90,6 +147,8 @@ class Drives:
             Shape (n-1,) [N m].
 
         """
+        if self.servo is not None:
+            return self._effort_for(self.servo.acceleration(reference, q, dq), q, dq)
         effort = self.feed_forward(reference, q)
         if not self.has_feedback or reference.position is self.idle.position:
             return effort
@@ -98,6 +157,21 @@ class Drives:
             + self._feedback_p * (reference.position - q[:-1])
             + self._feedback_d * (reference.velocity - dq[:-1])
         )
+
+    def rest_at(self, position: FloatArray) -> None:
+        """Let servos hold these joint angles (n,) [rad] where nothing is commanded."""
+        if self.servo is not None:
+            nothing = np.zeros(self.arm.n - 1)
+            self.idle = JointReference(nothing, position[:-1].copy(), nothing, nothing)
+
+    def _effort_for(self, acceleration: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return the effort under which the actuated joints accelerate so, the last one free."""
+        arm = self.arm
+        effort = arm.inverse_dynamics(q, dq, np.append(acceleration, 0.0))
+        # What the passive joint's row lacks accelerates it, and pushes back through its column.
+        column = arm.mass_matrix(q)[:, -1]
+        pushed: FloatArray = effort[:-1] - column[:-1] * (effort[-1] / column[-1])
+        return pushed
 
     def limited(self, effort: FloatArray) -> FloatArray:
         """Return what the motors can give, the very same array if that is all of it."""

@@ -45,14 +45,16 @@ class JointReference(NamedTuple):
 
     Attributes
     ----------
-    effort, position, velocity
-        Shape (n-1,) [N m], [rad], [rad/s]; position and velocity NaN where none are commanded.
+    effort, position, velocity, acceleration
+        Shape (n-1,) [N m], [rad], [rad/s], [rad/s^2]; all but the first NaN where none are
+        commanded.
 
     """
 
     effort: FloatArray
     position: FloatArray
     velocity: FloatArray
+    acceleration: FloatArray
 
 
 class _Course(NamedTuple):
@@ -160,7 +162,7 @@ class EffortProfile:
 
     def reference(self, t: float) -> JointReference:
         """
-        Return effort, position and velocity at an absolute time [s].
+        Return effort, position and its derivatives at an absolute time [s].
 
         The first position is held before the first point, the last one after the end. Positions
         without velocities are joined linearly.
@@ -168,8 +170,11 @@ class EffortProfile:
         effort = self.effort(t)
         if self._motion is None:
             missing = np.full(self.motors, np.nan)
-            return JointReference(effort, missing, missing)
-        return JointReference(effort, *self._motion.at(t - self.start))
+            return JointReference(effort, missing, missing, missing)
+        elapsed = t - self.start
+        position, velocity = self._motion.at(elapsed)
+        acceleration = self._motion.acceleration_at(elapsed)
+        return JointReference(effort, position, velocity, acceleration)
 
     def _lock_optional(
         self, name: str, value: npt.ArrayLike | None, shape: tuple[int, ...], unit: str

@@ -135,10 +135,12 @@ class PacedArm:
         self._simulated = SimulatedArm(
             settings.arm,
             position=settings.position,
-            step=1.0 / (settings.rate * self._per_sample),
+            step=settings.true_step,
             saturation=settings.saturation,
             feedback_p=settings.feedback_p,
             feedback_d=settings.feedback_d,
+            drive=settings.drive,
+            servo_bandwidth=settings.servo_bandwidth,
         )
         self._sensor = Sensor(settings.sensing)
         # The arm's own time starts at 0, where floating-point numbers resolve it best.

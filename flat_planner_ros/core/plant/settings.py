@@ -17,7 +17,8 @@
 from dataclasses import dataclass, field
 from math import ceil
 
-from flat_planner_ros.core.arm import check_number, InvalidModel, PlanarArm
+from flat_planner_ros.core.arm import check_number, Drive, InvalidModel, PlanarArm
+from flat_planner_ros.core.plant.drives import Servo
 from flat_planner_ros.core.plant.simulation import ArmState, GRID_TOLERANCE
 import numpy as np
 
@@ -102,7 +103,7 @@ class SimulationSettings:
         Samples per second of simulated time [Hz].
     step
         Longest integration step [s]; the step taken divides the time between samples.
-    saturation, feedback_p, feedback_d
+    saturation, feedback_p, feedback_d, drive, servo_bandwidth
         As in SimulatedArm.
     sensing
         Imperfections of the sensors.
@@ -121,6 +122,8 @@ class SimulationSettings:
     saturation: tuple[float, ...] | None = None
     feedback_p: tuple[float, ...] | None = None
     feedback_d: tuple[float, ...] | None = None
+    drive: Drive = Drive.EFFORT
+    servo_bandwidth: float = 0.0
     sensing: Sensing = field(default_factory=Sensing)
     start_tolerance: float = 0.05
     input_timeout: float = 0.1
@@ -133,6 +136,12 @@ class SimulationSettings:
             raise InvalidModel(
                 f'start_tolerance must be at least 0 rad, got {self.start_tolerance}'
             )
+        Servo(bandwidth=self.servo_bandwidth, step=self.true_step)
+
+    @property
+    def true_step(self) -> float:
+        """Return the integration step that is taken [s]."""
+        return 1.0 / (self.rate * self.steps_per_sample)
 
     @property
     def steps_per_sample(self) -> int:

@@ -15,17 +15,18 @@
 """True dynamics of an arm under a stamped effort command."""
 
 from math import floor, inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from flat_planner_ros.core.arm import (
     check_number,
     checked_array,
+    Drive,
     FloatArray,
     InvalidCommand,
     InvalidModel,
     PlanarArm,
 )
-from flat_planner_ros.core.plant.drives import Drives
+from flat_planner_ros.core.plant.drives import Drives, Servo
 from flat_planner_ros.core.plant.effort_profile import (
     check_bound,
     EffortProfile,
@@ -83,6 +84,9 @@ class SimulatedArm:
         Integration step [s].
     saturation, feedback_p, feedback_d
         As in Drives.
+    drive, servo_bandwidth
+        What a command's points are: efforts, or positions that servos follow with a bandwidth
+        [Hz], 0 for ideal ones.
 
     Raises
     ------
@@ -101,12 +105,15 @@ class SimulatedArm:
         saturation: npt.ArrayLike | None = None,
         feedback_p: npt.ArrayLike | None = None,
         feedback_d: npt.ArrayLike | None = None,
+        drive: Drive = Drive.EFFORT,
+        servo_bandwidth: float = 0.0,
     ) -> None:
         """Stand still at the position."""
         check_number('step', step, 's', above=0.0)
         check_number('time', time, 's')
+        servo = Servo(bandwidth=servo_bandwidth, step=step) if drive is Drive.POSITION else None
         self._drives = Drives(
-            arm, saturation=saturation, feedback_p=feedback_p, feedback_d=feedback_d
+            arm, saturation=saturation, feedback_p=feedback_p, feedback_d=feedback_d, servo=servo
         )
         self._origin, self._step = float(time), float(step)
         self._count = 0
@@ -197,8 +204,8 @@ class SimulatedArm:
                 f'the command ended at {profile.end:.6f} s, before the present {self.time:.6f} s'
             )
         drives, present = self._drives, self._reference(now)
-        if drives.has_feedback and profile.positions is None:
-            raise InvalidCommand('feedback needs a command with positions')
+        if drives.follows_positions and profile.positions is None:
+            raise InvalidCommand('feedback or a servo needs a command with positions')
         if profile.efforts[-1].any() and not self.arm.has_weight:
             # Nobody could know when to let go, and a ramp to zero would be another motion.
             raise InvalidCommand(
@@ -233,6 +240,8 @@ class SimulatedArm:
 
         """
         self._refuse_if_stopped()
+        if self._drives.servo is not None:
+            raise InvalidCommand('a servo follows positions, it takes no efforts')
         shape = (self.arm.n - 1,)
         held = checked_array('effort', effort, 'N m', shape=shape, error=InvalidCommand)
         check_bound('effort', held, MAX_EFFORT, 'N m')
@@ -246,6 +255,7 @@ class SimulatedArm:
         self._profile = None
         self._idle_until = -inf
         self._braked_until = -inf
+        self._drives.rest_at(self._position)
         self._held = self._drives.idle
         self._held_until = inf
         if self.arm.has_weight:
@@ -344,7 +354,7 @@ class SimulatedArm:
         if profile is None:
             return self._held if t < self._held_until else idle
         is_idle = t < self._idle_until or t > profile.end
-        if self._drives.has_feedback:
+        if self._drives.follows_positions:
             reference = profile.reference(t)
             return reference._replace(effort=idle.effort) if is_idle else reference
         return idle if is_idle else idle._replace(effort=profile.effort(t))
@@ -364,10 +374,7 @@ def rollout(
     until: float,
     *,
     step: float = 1e-3,
-    position: npt.ArrayLike | None = None,
-    saturation: npt.ArrayLike | None = None,
-    feedback_p: npt.ArrayLike | None = None,
-    feedback_d: npt.ArrayLike | None = None,
+    **options: Any,
 ) -> Rollout:
     """
     Return the motion of an arm, at rest when the profile starts, at every step.
@@ -378,19 +385,11 @@ def rollout(
         What is moved and by what.
     until
         Absolute time of the end [s].
-    step, position, saturation, feedback_p, feedback_d
+    step, options
         As in SimulatedArm.
 
     """
-    simulated = SimulatedArm(
-        arm,
-        position=position,
-        time=profile.start,
-        step=step,
-        saturation=saturation,
-        feedback_p=feedback_p,
-        feedback_d=feedback_d,
-    )
+    simulated = SimulatedArm(arm, time=profile.start, step=step, **options)
     simulated.command(profile, profile.start)
     times, positions, velocities = [simulated.time], [simulated.position], [simulated.velocity]
     while simulated.advance(min(until, simulated.time + step)):

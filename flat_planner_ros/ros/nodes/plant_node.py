@@ -102,7 +102,8 @@ class PlantNode(Node):
                     'it is empty; to end a motion call ~/reset, or ~/stop of the planner'
                 )
             joints = self._settings.joints
-            profile = conversions.effort_profile(points, joints, self._arm.time)
+            drive = self._settings.simulation.drive
+            profile = conversions.effort_profile(points, joints, self._arm.time, drive)
             remark = self._arm.command(profile)
         except FlatPlannerError as error:
             self.get_logger().warning(f'trajectory ignored: {error}')

@@ -17,6 +17,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.core.plant import Sensing, SimulationSettings
 from flat_planner_ros.ros.parameters.arm_model import arm_of, FIXED_MODEL_ROWS, per_joint
 from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row, Values
@@ -183,6 +184,16 @@ ROWS = [
         upper=10.0,
     ),
     Row(
+        'servo.bandwidth',
+        SimulationSettings.servo_bandwidth,
+        'Hz',
+        'with drive position: how fast a joint follows, critically damped',
+        '0 = ideal',
+        lower=0.0,
+        upper=1e4,
+        read_only=True,
+    ),
+    Row(
         'feedback.p',
         DOUBLES,
         'N m/rad',
@@ -240,6 +251,8 @@ def build(values: Values) -> PlantSettings:
         saturation=per_joint(values, 'torque.saturation', n - 1),
         feedback_p=per_joint(values, 'feedback.p', n - 1),
         feedback_d=per_joint(values, 'feedback.d', n - 1),
+        drive=Drive(values['drive']),
+        servo_bandwidth=values['servo.bandwidth'],
         sensing=Sensing(
             position_std=values['noise.position_std'],
             seed=values['noise.seed'],

@@ -18,7 +18,7 @@ from array import array
 from collections.abc import Sequence
 from typing import TypeVar
 
-from flat_planner_ros.core.arm import FloatArray, InvalidCommand, InvalidRequest
+from flat_planner_ros.core.arm import Drive, FloatArray, InvalidCommand, InvalidRequest
 from flat_planner_ros.core.monitor import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
@@ -174,7 +174,9 @@ def planned_motion(points: PointTable) -> PlannedMotion:
     )
 
 
-def effort_profile(points: PointTable, joints: Sequence[str], now: float) -> EffortProfile:
+def effort_profile(
+    points: PointTable, joints: Sequence[str], now: float, drive: Drive = Drive.EFFORT
+) -> EffortProfile:
     """
     Return the command that a trajectory states.
 
@@ -186,6 +188,8 @@ def effort_profile(points: PointTable, joints: Sequence[str], now: float) -> Eff
         The plant's joints, the passive one last.
     now
         Present time [s].
+    drive
+        What of it is played; positions need no efforts with them.
 
     Raises
     ------
@@ -197,7 +201,10 @@ def effort_profile(points: PointTable, joints: Sequence[str], now: float) -> Eff
     if sorted(names) not in (sorted(joints), sorted(joints[:-1])):
         raise InvalidCommand(f'joints are {names}, expected {list(joints)}')
     try:
-        efforts = _table(points, 'effort')
+        efforts = _optional_table(points, 'effort')
+        if efforts is None:
+            needed = 'effort' if drive is Drive.EFFORT else 'positions'
+            efforts = np.zeros(_table(points, needed).shape)
         positions = _optional_table(points, 'positions')
         velocities = _optional_table(points, 'velocities')
         accelerations = _optional_table(points, 'accelerations')
