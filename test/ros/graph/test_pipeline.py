@@ -103,3 +103,25 @@ def test_replan_repeats_the_last_goal(graph):
     graph.expect(lambda: len(suite.reports) > before, 'a report')
     assert suite.plans[-1].points[-1].positions[0] == 0.5
     assert suite.states[-1].position[0] == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize('bandwidth', [0.0, 20.0])
+def test_servos_leave_what_is_predicted_for_servos(graph, bandwidth):
+    heavy = {
+        'joints': ['joint1', 'joint2'],
+        'model.inertia_star': [6.4e-4, 2.5e-4],
+        'model.stiffness': 2.3e-2,
+        'model.damping': 2.0e-5,
+    }
+    command = {'command.include_effort': False, 'command.include_passive_joint': False}
+    softer = {'mismatch.stiffness_scale': 0.9, 'servo.bandwidth': bandwidth}
+    suite = Suite(
+        graph,
+        {**heavy, **command, 'strategy': 'insensitive'},
+        {**heavy, **softer},
+        *('-p', 'drive:=position'),
+    )
+    verdict, report = suite.carry_out(pi, 1.2)
+    assert float(verdict['predicted_residual_worst']) < 0.006
+    left = float(report['amplitude'])
+    assert 5e-4 < left <= float(verdict['predicted_residual_worst']) * 1.02
