@@ -22,8 +22,8 @@ from flat_planner_ros.core.model_fit import Measurements
 from flat_planner_ros.ros.recording.recording import Recording
 from flat_planner_ros.ros.recording.replay import find_topic, JOINT_STATE
 from flat_planner_ros.ros.wire import stamps
-from flat_planner_ros.ros.wire.conversions import JointStateReader
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.message_types import message_class
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
