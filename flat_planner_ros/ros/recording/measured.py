@@ -15,13 +15,13 @@
 """Angles and efforts of an arm from recordings."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, JointSample
 from flat_planner_ros.core.model_fit import Measurements
 from flat_planner_ros.ros.recording.recording import Recording
 from flat_planner_ros.ros.recording.replay import find_topic, JOINT_STATE
-from flat_planner_ros.ros.wire import stamps
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.message_types import message_class
@@ -89,15 +89,14 @@ def _samples(
     samples: list[JointSample] = []
     for entry in recording.entries({name}):
         msg = deserialize_message(entry.message, message_class(entry.kind))
-        if not stamps.is_stamped(msg):
-            msg.header.stamp = stamps.time_msg(entry.time / NANOSECONDS)
         try:
-            sample = reader.read(msg)
+            found = reader.read(msg, partial(float, entry.time / NANOSECONDS))
         except InvalidRequest:
-            continue  # a part of the joints, as several drivers on one topic send it
-        is_later = not samples or sample.time > samples[-1].time
-        if is_later and _is_complete(sample):
-            samples.append(sample)
+            continue  # none of the joints, as several drivers on one topic send it
+        for sample in found:
+            is_later = not samples or sample.time > samples[-1].time
+            if is_later and _is_complete(sample):
+                samples.append(sample)
     return samples
 
 
