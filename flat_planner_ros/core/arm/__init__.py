@@ -41,10 +41,17 @@ from flat_planner_ros.core.arm.errors import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
-from flat_planner_ros.core.arm.joint_merger import JointMerger, MERGING_TOLERANCE
+from flat_planner_ros.core.arm.joint_merger import JointMerger
 from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
 from flat_planner_ros.core.arm.planar_arm import Drive, NaturalMode, PlanarArm
-from flat_planner_ros.core.arm.samples import JointSample, SampledMotion
+from flat_planner_ros.core.arm.samples import (
+    JointSample,
+    JointStateRules,
+    JUMP,
+    SampledMotion,
+    travel,
+    TurnCounter,
+)
 from flat_planner_ros.core.arm.urdf import (
     ArmDescription,
     ControlBlock,
@@ -79,9 +86,10 @@ __all__ = [
     'InvalidRequest',
     'JointMerger',
     'JointSample',
+    'JointStateRules',
+    'JUMP',
     'LinkBody',
     'locked',
-    'MERGING_TOLERANCE',
     'NaturalMode',
     'NotFlat',
     'OutOfReach',
@@ -90,6 +98,8 @@ __all__ = [
     'SampledMotion',
     'strict_arithmetic',
     'suggest_counterbalances',
+    'travel',
+    'TurnCounter',
     'UncertifiedLoop',
     'UncertifiedPlan',
     'urdf_of',

@@ -19,11 +19,8 @@ from math import inf, isfinite, nan
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm.arrays import FloatArray
-from flat_planner_ros.core.arm.samples import cubic_coefficients, JointSample
+from flat_planner_ros.core.arm.samples import cubic_coefficients, JointSample, MERGING_TOLERANCE
 import numpy as np
-
-MERGING_TOLERANCE = 0.05
-"""Distance in time within which every joint of a sample has been heard [s]: a period at 20 Hz."""
 
 KEPT = 1.0
 """Time for which readings wait for those of the other joints [s]; stamps further back restart."""

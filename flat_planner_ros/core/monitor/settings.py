@@ -20,7 +20,7 @@ from enum import Enum
 from flat_planner_ros.core.arm import (
     check_number,
     InvalidRequest,
-    MERGING_TOLERANCE,
+    JointStateRules,
     PlanarArm,
 )
 from flat_planner_ros.core.monitor.identification import ActuatedJoints
@@ -51,8 +51,8 @@ class MonitorSettings:
     timeout
         Silence after which the measurement is stale, and backward step of time from which the
         clock counts as reset [s].
-    merging_tolerance
-        Distance in time within which all joints of a sample that comes in parts were heard [s].
+    joint_states
+        How they are read.
     expected_frequency
         Damped frequency expected of the oscillation [Hz], or ``None``.
     expected_damping_ratio
@@ -69,7 +69,7 @@ class MonitorSettings:
     amplitude_error: float = 5e-2
     settling_band: float = 5e-3
     timeout: float = 0.5
-    merging_tolerance: float = MERGING_TOLERANCE
+    joint_states: JointStateRules = JointStateRules()  # noqa: RUF009  A frozen value.
     expected_frequency: float | None = None
     expected_damping_ratio: float | None = None
     arm: PlanarArm | None = None

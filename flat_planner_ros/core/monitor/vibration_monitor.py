@@ -17,20 +17,11 @@
 from enum import Enum
 from math import inf, isfinite, nan
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, JointSample
+from flat_planner_ros.core.arm import InvalidRequest, JointSample, JUMP, travel
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record, Residual
 from flat_planner_ros.core.monitor.report import assess, VibrationReport
 from flat_planner_ros.core.monitor.settings import MonitorSettings
 import numpy as np
-
-JUMP = 0.2
-"""Change of a joint angle between two samples, beyond its velocity's, that is no motion [rad]."""
-
-CURVATURE = 1.5
-"""Mean velocity between two samples at most, relative to the larger one at either end [-]."""
-
-UNKNOWN_SPEED = 30.0
-"""Speed that a joint may have where its velocity is not measured [rad/s]."""
 
 
 class Phase(Enum):
@@ -313,8 +304,7 @@ def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> st
         return ''
     planned = motion.reference(sample.time)[0] - motion.reference(former.time)[0]
     elapsed = sample.time - former.time
-    speed = np.maximum(_speed(former), _speed(sample))
-    excess = np.minimum(np.abs(change), np.abs(change - planned)) - CURVATURE * elapsed * speed
+    excess = np.minimum(np.abs(change), np.abs(change - planned)) - travel(former, sample)
     joint = int(np.argmax(excess))
     if excess[joint] <= JUMP:
         return ''
@@ -322,10 +312,3 @@ def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> st
         f'{motion.joint_names[joint]} jumped by {change[joint]:.3g} rad within '
         f'{1e3 * elapsed:.3g} ms at {sample.time:.3f} s'
     )
-
-
-def _speed(sample: JointSample) -> FloatArray:
-    """Return how fast each joint moves at most, shape (n,) [rad/s]."""
-    if sample.velocities is None:
-        return np.full(sample.positions.shape, UNKNOWN_SPEED)
-    return np.nan_to_num(np.abs(sample.velocities), nan=UNKNOWN_SPEED, posinf=UNKNOWN_SPEED)

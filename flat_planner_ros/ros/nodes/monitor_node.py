@@ -114,7 +114,7 @@ class MonitorNode(Node):
         """Judge with changed parameters from now on."""
         self._monitor.settings = settings
         if self._reader is not None:
-            self._reader.tolerance = settings.merging_tolerance
+            self._reader.rules = settings.joint_states
 
     def _on_plan(self, data: bytes) -> None:
         """Take a plan, for whatever joints it names."""
@@ -126,8 +126,10 @@ class MonitorNode(Node):
         if self._plan is None or self._plan.joint_names != motion.joint_names:
             self._forget()
             self._reader = JointStateReader(
-                motion.joint_names, self._monitor.settings.merging_tolerance
+                motion.joint_names, self._monitor.settings.joint_states
             )
+        if self._reader is not None:
+            self._reader.align(motion.positions[0])
         self._plan = motion
         self._publish_reports(self._monitor.watch(motion))
 

@@ -50,7 +50,7 @@ class PlannerNode(Node):
         super().__init__(interfaces.PLANNER, **options)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
-        self._reader = JointStateReader(self._joints, self._settings.merging_tolerance)
+        self._reader = JointStateReader(self._joints, self._settings.joint_states)
         self._sent_start: float | None = None
         self._open_publishers()
         self._listen()
@@ -120,7 +120,7 @@ class PlannerNode(Node):
     def _apply(self, settings: PlannerSettings) -> None:
         """Plan the next goals with changed parameters."""
         self._session.settings = settings.session
-        self._reader.tolerance = settings.merging_tolerance
+        self._reader.rules = settings.joint_states
         self._efforts.configure(settings.stream_effort, settings.session.period)
 
     def _on_measured(self, msg: JointState) -> None:

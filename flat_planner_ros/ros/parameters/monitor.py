@@ -19,9 +19,9 @@ from math import pi
 from flat_planner_ros.core.arm import Drive, PlanarArm
 from flat_planner_ros.core.monitor import ActuatedJoints, MonitorSettings
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
+from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
 from flat_planner_ros.ros.parameters.row import (
     InvalidParameter,
-    JOINT_STATES_TOLERANCE,
     Row,
     Values,
 )
@@ -65,7 +65,7 @@ ROWS = [
         lower=0.01,
         upper=60.0,
     ),
-    JOINT_STATES_TOLERANCE,
+    *JOINT_STATE_ROWS,
     Row(
         'actuated_joints',
         MonitorSettings.actuated_joints,
@@ -101,7 +101,7 @@ def build(values: Values) -> MonitorSettings:
         amplitude_error=values['amplitude_error'],
         settling_band=values['settling_band'],
         timeout=values['timeout'],
-        merging_tolerance=values[JOINT_STATES_TOLERANCE.name],
+        joint_states=joint_state_rules(values),
         expected_frequency=frequency,
         expected_damping_ratio=damping_ratio,
         arm=arm,

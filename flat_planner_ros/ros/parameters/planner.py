@@ -19,16 +19,16 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isqrt
 
-from flat_planner_ros.core.arm import Drive, FlatModel
+from flat_planner_ros.core.arm import Drive, FlatModel, JointStateRules
 from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy
 from flat_planner_ros.core.planning import check_options, JointLimits, OnViolation, PlanningOptions
 from flat_planner_ros.core.session import SessionSettings, StartSource
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
+from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
 from flat_planner_ros.ros.parameters.row import (
     DOUBLES,
     InvalidParameter,
-    JOINT_STATES_TOLERANCE,
     Row,
     Values,
 )
@@ -51,8 +51,8 @@ class PlannerSettings:
     ----------
     session
         Settings of its session.
-    merging_tolerance
-        Distance in time within which all joints of a sample that comes in parts were heard [s].
+    joint_states
+        How they are read.
     include_passive_joint, include_effort
         Form of the command.
     reference_rate
@@ -67,7 +67,7 @@ class PlannerSettings:
     """
 
     session: SessionSettings
-    merging_tolerance: float
+    joint_states: JointStateRules
     include_passive_joint: bool
     include_effort: bool
     reference_rate: float
@@ -200,7 +200,7 @@ ROWS = [
         'age from which a joint state is stale',
         lower=0.0,
     ),
-    JOINT_STATES_TOLERANCE,
+    *JOINT_STATE_ROWS,
     Row(
         'start_delay',
         SessionSettings.start_delay,
@@ -316,7 +316,7 @@ def build(values: Values) -> PlannerSettings:
     )
     return PlannerSettings(
         session=session,
-        merging_tolerance=values[JOINT_STATES_TOLERANCE.name],
+        joint_states=joint_state_rules(values),
         include_passive_joint=values['command.include_passive_joint'],
         include_effort=values['command.include_effort'],
         reference_rate=values['reference_rate'],

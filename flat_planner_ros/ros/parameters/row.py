@@ -27,7 +27,7 @@ from math import inf, isfinite, isnan
 import sys
 from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError, MERGING_TOLERANCE
+from flat_planner_ros.core.arm import FlatPlannerError
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
@@ -183,16 +183,6 @@ class Row:
                 raise InvalidParameter(
                     f'{self.name} must be {self.constraints or "finite"}, got {number}'
                 )
-
-
-JOINT_STATES_TOLERANCE = Row(
-    'joint_states.tolerance',
-    MERGING_TOLERANCE,
-    's',
-    'time within which all joints were heard, where joint states come in parts',
-    lower=0.0,
-)
-"""Parameter of every node that reads joint states."""
 
 
 def wrong_type(row: Row, value: Any) -> InvalidParameter:

@@ -157,7 +157,7 @@ def replay(
     changes = list(settings[1:])
     for entry in recording.entries({sources.plan, sources.joint_states}):
         while changes and changes[0][0] <= entry.time:
-            player.monitor.settings = changes.pop(0)[1]
+            player.apply(changes.pop(0)[1])
         player.take(entry)
     player.end()
     return player.judgements
@@ -179,6 +179,12 @@ class _Player:
         self._motions: list[PlannedMotion] = []
         self._samples: list[JointSample] = []
 
+    def apply(self, settings: MonitorSettings) -> None:
+        """Judge with changed settings from now on."""
+        self.monitor.settings = settings
+        if self._reader is not None:
+            self._reader.rules = settings.joint_states
+
     def take(self, entry: Entry) -> None:
         """Take a message; one that cannot be used is left out, as in the node."""
         msg = deserialize_message(entry.message, message_class(entry.kind))
@@ -199,8 +205,9 @@ class _Player:
         motion = conversions.planned_motion_from_trajectory(msg)
         if self._reader is None or tuple(self._reader.joints) != motion.joint_names:
             self.monitor.reset()
-            self._reader = JointStateReader(motion.joint_names)
+            self._reader = JointStateReader(motion.joint_names, self.monitor.settings.joint_states)
             self._samples.clear()
+        self._reader.align(motion.positions[0])
         self._motions.append(motion)
         self._keep(self.monitor.watch(motion))
 
@@ -208,7 +215,6 @@ class _Player:
         """Take a joint state that arrived then [s]."""
         if self._reader is None:
             return
-        self._reader.tolerance = self.monitor.settings.merging_tolerance
         for sample in self._reader.read(msg, lambda: arrival):
             self._stamp = sample.time
             self._samples.append(sample)

@@ -16,13 +16,15 @@
 from array import array
 from collections.abc import Callable, Sequence
 from math import inf
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import (
     FloatArray,
     InvalidRequest,
     JointMerger,
     JointSample,
-    MERGING_TOLERANCE,
+    JointStateRules,
+    TurnCounter,
 )
 from flat_planner_ros.core.monitor import joint_indices
 from flat_planner_ros.ros.wire import stamps
@@ -43,6 +45,29 @@ WHOLE = 1.0
 """Time around a message with all joints in which parts say nothing new [s]."""
 
 
+DEFAULT_RULES = JointStateRules()
+
+
+class _Layout(NamedTuple):
+    """
+    What a list of names says of the joints.
+
+    Attributes
+    ----------
+    places
+        Where the arm's joints stand in it.
+    part
+        Which joints these are, None for all.
+    counter
+        Of their turns.
+
+    """
+
+    places: Places
+    part: list[int] | None
+    counter: TurnCounter
+
+
 class JointStateReader:
     """
     Reads joint states of one source that names all joints, or of several with some each.
@@ -53,33 +78,38 @@ class JointStateReader:
     ----------
     joints
         Joints whose states are wanted, in this order.
-    tolerance
-        Distance in time within which all joints of a sample that comes in parts were heard [s].
+    rules
+        How they are read; may be replaced at any time.
 
     """
 
-    def __init__(self, joints: Sequence[str], tolerance: float = MERGING_TOLERANCE) -> None:
+    def __init__(self, joints: Sequence[str], rules: JointStateRules = DEFAULT_RULES) -> None:
         self.joints = list(joints)
-        self._merger = JointMerger(joints, tolerance)
+        self._merger = JointMerger(joints)
+        self._counters: dict[tuple[int, ...], TurnCounter] = {}
+        self._place: FloatArray | None = None
+        self.rules = rules
         self._names: list[str] | None = None
-        self._layout: tuple[Places, list[int] | None] = (slice(None), None)
-        self._known: dict[tuple[str, ...], tuple[Places, list[int] | None]] = {}
+        self._layout = _Layout(slice(None), None, TurnCounter())
+        self._known: dict[tuple[str, ...], _Layout] = {}
         self._remarks: dict[str, bool] = {}
         self._whole = -inf
+        self._said: FloatArray | None = None
 
     @property
-    def tolerance(self) -> float:
-        """Distance in time within which all joints were heard [s]; may be set at any time."""
-        return self._merger.tolerance
+    def rules(self) -> JointStateRules:
+        """Return how joint states are read."""
+        return self._rules
 
-    @tolerance.setter
-    def tolerance(self, tolerance: float) -> None:
-        self._merger.tolerance = tolerance
+    @rules.setter
+    def rules(self, rules: JointStateRules) -> None:
+        self._rules = rules
+        self._merger.tolerance = rules.tolerance
 
     @property
     def is_in_parts(self) -> bool:
         """Tell whether the last message named some of the joints only."""
-        return self._layout[1] is not None
+        return self._layout.part is not None
 
     @property
     def lack(self) -> str:
@@ -122,7 +152,7 @@ class JointStateReader:
         if names != self._names:
             self._layout = self._layout_of(names)
             self._names = names
-        places, part = self._layout
+        places, part, counter = self._layout
         count = len(names)
         if len(msg.position) != count:
             raise InvalidRequest(f'{len(msg.position)} positions for {count} joint names')
@@ -132,6 +162,10 @@ class JointStateReader:
             velocities=_optional(msg.velocity, count, places),
             efforts=_optional(msg.effort, count, places),
         )
+        if self._rules.unwrap:
+            raw, sample = sample, counter.unwrapped(sample)
+            if sample is not raw:
+                self._remark_turns(part, counter)
         if part is None:
             self._whole = sample.time
             return [sample]
@@ -140,11 +174,42 @@ class JointStateReader:
         named = ', '.join(self.joints[index] for index in part)
         self._remark(
             f'joint states come in parts ({named} by itself): they are merged within '
-            f'joint_states.tolerance {self.tolerance:g} s'
+            f'joint_states.tolerance {self.rules.tolerance:g} s'
         )
         return self._merger.add(part, sample)
 
-    def _layout_of(self, names: list[str]) -> tuple[Places, list[int] | None]:
+    def align(self, pose: FloatArray) -> None:
+        """
+        Count turns from those of a planned pose near which the arm is, shape (n,) [rad].
+
+        Encoders that are wrapped to +-pi do not tell how often they have turned before.
+        """
+        self._place = pose
+        for part, counter in self._counters.items():
+            counter.align(pose[list(part)])
+
+    def _counter(self, part: Sequence[int]) -> TurnCounter:
+        """Return the counter of joints that come together."""
+        key = tuple(part)
+        if key not in self._counters:
+            self._counters[key] = TurnCounter()
+            if self._place is not None:
+                self._counters[key].align(self._place[list(key)])
+        return self._counters[key]
+
+    def _remark_turns(self, part: Sequence[int] | None, counter: TurnCounter) -> None:
+        """Say, once, of which joints turns are counted."""
+        if counter.turns is self._said:
+            return
+        self._said = counter.turns
+        for index, turns in zip(part or range(len(self.joints)), counter.turns, strict=True):
+            if turns:
+                self._remark(
+                    f'{self.joints[index]} is wrapped to +-pi in joint states: its turns are '
+                    'counted (joint_states.unwrap)'
+                )
+
+    def _layout_of(self, names: list[str]) -> _Layout:
         """Return where a message with these names has the joints, and which if not all."""
         key = tuple(names)
         if key not in self._known:
@@ -153,15 +218,17 @@ class JointStateReader:
             self._known[key] = self._looked_up(names)
         return self._known[key]
 
-    def _looked_up(self, names: list[str]) -> tuple[Places, list[int] | None]:
+    def _looked_up(self, names: list[str]) -> _Layout:
         """Return the layout of a message with these names."""
+        whole = range(len(self.joints))
         if names == self.joints:
-            return slice(None), None
+            return _Layout(slice(None), None, self._counter(whole))
         there = [name for name in self.joints if name in names] or self.joints
         places = joint_indices(names, there)
         if len(there) == len(self.joints):
-            return places, None
-        return places, [self.joints.index(name) for name in there]
+            return _Layout(places, None, self._counter(whole))
+        part = [self.joints.index(name) for name in there]
+        return _Layout(places, part, self._counter(part))
 
     def _arrived(self, arrival: Callable[[], float]) -> float:
         """Return the time of arrival of a message without a stamp."""

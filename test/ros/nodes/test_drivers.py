@@ -92,14 +92,32 @@ def test_a_goal_starts_from_a_joint_state_without_a_stamp(graph):
     assert len(graph.logged('joint states have no stamp')) == 1
 
 
-def plan():
-    """Return a cubic motion of joint 1 to 1 rad."""
+def test_a_goal_starts_from_the_turns_that_a_wrapped_joint_has_made(graph):
+    drivers = Drivers(graph)
+    plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
+    for angle in (3.1, -3.1):
+        drivers.publish(joint1=angle, joint2=0.0)
+        graph.expect(
+            lambda q=angle: (
+                (s := drivers.node._session.measured)
+                and np.cos(s.positions[0] - q) == pytest.approx(1.0)
+            ),
+            'the sample',
+        )
+    assert drivers.send(goal(3.5))['state'] == 'ACCEPTED'
+    graph.expect(lambda: plans, 'a plan')
+    assert plans[0].points[0].positions[0] == pytest.approx(2 * pi - 3.1)
+    assert len(graph.logged('joint1 is wrapped to +-pi')) == 1
+
+
+def plan(start=0.0, final=1.0):
+    """Return a cubic motion of joint 1."""
     msg = JointTrajectory(joint_names=['joint1', 'joint2'])
     msg.header.stamp = stamps.time_msg(START)
     for s in np.linspace(0.0, 1.0, 51).tolist():
         point = JointTrajectoryPoint(time_from_start=stamps.duration_msg(s * DURATION))
-        point.positions = [s**2 * (3 - 2 * s), 0.0]
-        point.velocities = [6 * s * (1 - s) / DURATION, 0.0]
+        point.positions = [start + (final - start) * s**2 * (3 - 2 * s), 0.0]
+        point.velocities = [(final - start) * 6 * s * (1 - s) / DURATION, 0.0]
         msg.points.append(point)
     return msg
 
@@ -133,3 +151,30 @@ def test_the_monitor_judges_joint_states_in_parts(graph):
     assert float(report['frequency']) == pytest.approx(FREQUENCY, rel=1e-3)
     assert int(report['samples']) == pytest.approx(100 * WINDOW, abs=3)
     assert len(graph.logged('joint states come in parts')) == 2
+
+
+def test_the_monitor_judges_a_wrapped_joint_by_its_turns(graph):
+    """It comes from a turn that the monitor has not seen, and goes on over +pi."""
+    monitor = graph.create(MonitorNode, {'window': WINDOW, 'timeout': 60.0})
+    reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
+    start, final = 2 * pi + 1.0, 3 * pi
+    graph.publish('/flat_planner/plan', plan(start, final), interfaces.LATCHED)
+    graph.expect(lambda: monitor._plan, 'the plan')
+    residuals = graph.collect(JointState, '/flat_monitor/residual')
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(200)
+    for k in range(round((DURATION + WINDOW) * 50) + 1):
+        elapsed = k / 50 - DURATION
+        s = min(k / 50 / DURATION, 1.0)
+        angle = start + (final - start) * s**2 * (3 - 2 * s) + noise[k]
+        swing = AMPLITUDE * np.cos(2 * pi * FREQUENCY * elapsed) if elapsed >= 0.0 else 0.0
+        msg = JointState(name=['joint1', 'joint2'])
+        msg.position = [float((angle + pi) % (2 * pi) - pi), float(swing)]
+        msg.header.stamp = stamps.time_msg(START + k / 50)
+        graph.publish(STATES, msg)
+        graph.expect(lambda n=k: len(residuals) > n, 'a residual')
+    graph.expect(lambda: reports, 'a report')
+    report = values(reports[0])
+    assert float(report['amplitude']) == pytest.approx(AMPLITUDE, rel=1e-3)
+    assert float(report['final_error.joint1']) == pytest.approx(0.0, abs=1e-4)
+    assert max(abs(msg.position[0]) for msg in residuals) < 1e-3
+    assert len(graph.logged('joint1 is wrapped to +-pi')) == 1

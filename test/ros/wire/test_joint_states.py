@@ -14,7 +14,9 @@
 
 """Joint states as drivers send them: in parts, without stamps."""
 
-from flat_planner_ros.core.arm import InvalidRequest
+from math import pi
+
+from flat_planner_ros.core.arm import InvalidRequest, JointStateRules
 from flat_planner_ros.ros.wire import stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 import numpy as np
@@ -80,6 +82,28 @@ def test_whole_messages_are_read_without_a_copy():
     msg = message(1.0, joint1=1.0, joint2=2.0)
     (sample,) = JointStateReader(JOINTS).read(msg, lambda: 0.0)
     assert np.shares_memory(sample.positions, np.frombuffer(msg.position))
+
+
+def test_turns_of_a_wrapped_joint_are_counted_in_whole_messages_and_in_parts():
+    reader = JointStateReader(JOINTS)
+    whole = [message(1.0 + 0.01 * k, joint2=0.0, joint1=q) for k, q in enumerate((3.1, -3.1))]
+    assert read(reader, *whole)[1] == (1.01, [2 * pi - 3.1, 0.0])
+    (remark,) = reader.take_remarks()
+    assert remark.startswith('joint1 is wrapped to +-pi in joint states: its turns are counted')
+    reader = JointStateReader(JOINTS)
+    parts = [message(1.0 + 0.01 * k, joint1=q) for k, q in enumerate((3.1, -3.1))]
+    assert read(reader, *parts, message(1.01, joint2=0.0)) == [(1.01, [2 * pi - 3.1, 0.0])]
+    reader = JointStateReader(JOINTS, JointStateRules(unwrap=False))
+    assert read(reader, *whole)[1] == (1.01, [-3.1, 0.0])
+
+
+def test_a_plan_tells_the_turns_of_before():
+    reader = JointStateReader(JOINTS)
+    reader.align(np.array([2 * pi + 1.0, 0.0]))
+    assert read(reader, message(1.0, joint1=1.0, joint2=0.0)) == [(1.0, [2 * pi + 1.0, 0.0])]
+    assert len(reader.take_remarks()) == 1
+    reader.align(np.array([1.0, 0.0]))
+    assert read(reader, message(1.01, joint1=1.0, joint2=0.0)) == [(1.01, [1.0, 0.0])]
 
 
 def test_many_lists_of_names_are_no_matter():

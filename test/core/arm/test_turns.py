@@ -1,0 +1,104 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Turns of wrapped encoders: counted where an arm turns, not where it is put elsewhere."""
+
+from math import nan, pi
+
+from flat_planner_ros.core.arm import JointSample, TurnCounter
+import numpy as np
+import pytest
+
+
+def wrapped(angles):
+    """Return angles within +-pi, as an encoder shows them."""
+    return (np.asarray(angles, dtype=float) + pi) % (2.0 * pi) - pi
+
+
+def sample(time, positions, velocities=None):
+    """Return a measured state."""
+    return JointSample(
+        time=time,
+        positions=np.array(positions, dtype=float),
+        velocities=None if velocities is None else np.array(velocities, dtype=float),
+    )
+
+
+def unwrapped(counter, *samples):
+    """Return the angles that a counter makes of samples."""
+    return np.array([counter.unwrapped(s).positions for s in samples])
+
+
+@pytest.mark.parametrize('period', [0.001, 0.01, 0.1])
+@pytest.mark.parametrize('knows_velocity', [True, False])
+def test_turns_are_counted_in_both_directions(period, knows_velocity):
+    times = np.arange(0.0, 4.0, period)
+    angles = np.stack([9.0 * np.sin(1.5 * times), -20.0 * np.sin(0.7 * times)], axis=1)
+    rates = np.stack([13.5 * np.cos(1.5 * times), -14.0 * np.cos(0.7 * times)], axis=1)
+    known = rates if knows_velocity else [None] * len(times)
+    rows = zip(times, wrapped(angles), known, strict=True)
+    counter = TurnCounter()
+    found = unwrapped(counter, *(sample(*row) for row in rows))
+    assert found == pytest.approx(angles, abs=1e-12)
+    assert np.abs(counter.turns).max() > 0
+
+
+def test_an_encoder_that_flickers_at_pi_stands_still():
+    rng = np.random.default_rng(5)
+    angles = pi + 1e-3 * rng.standard_normal(200)
+    shown = wrapped(angles)
+    assert {-1.0, 1.0} <= set(np.sign(shown))
+    counter = TurnCounter()
+    samples = [sample(0.005 * k, [q], [0.0]) for k, q in enumerate([3.1, *shown])]
+    assert unwrapped(counter, *samples)[1:, 0] == pytest.approx(angles, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('before', 'after'),
+    [(3.0, -0.3), (1.75, -1.75), (2.9, -2.9), (2 * pi, 0.0), (7.0, 0.7), (3.5, -2.7)],
+)
+def test_an_arm_that_is_put_elsewhere_has_not_turned(before, after):
+    first, last = sample(0.0, [before], [0.0]), sample(0.005, [after], [0.0])
+    counter = TurnCounter()
+    counter.unwrapped(first)
+    assert counter.unwrapped(last) is last
+
+
+def test_an_encoder_of_many_turns_is_left_alone():
+    counter = TurnCounter()
+    for k in range(100):
+        state = sample(0.005 * k, [0.1 * k, -0.1 * k], [20.0, -20.0])
+        assert counter.unwrapped(state) is state
+
+
+def test_a_turn_over_an_unknown_angle_is_counted():
+    counter = TurnCounter()
+    found = unwrapped(
+        counter,
+        *(sample(0.005 * k, [q, 0.0]) for k, q in enumerate([3.1, nan, nan, -3.1, -3.0])),
+    )
+    assert np.isnan(found[1:3, 0]).all()
+    assert found[3:, 0] == pytest.approx([2 * pi - 3.1, 2 * pi - 3.0])
+    assert not found[:, 1].any()
+
+
+@pytest.mark.parametrize('is_heard_before', [True, False])
+def test_a_pose_tells_the_turns_of_before(is_heard_before):
+    counter = TurnCounter()
+    if is_heard_before:
+        counter.unwrapped(sample(0.0, [-3.1, 0.0, 1.0]))
+    # Joint 1 one turn on, joint 2 elsewhere, joint 3 as it is.
+    counter.align(np.array([2 * pi - 3.0, 3.0, 1.1]))
+    (found,) = unwrapped(counter, sample(0.005, [-3.05, 0.0, 1.0]))
+    assert found == pytest.approx([2 * pi - 3.05, 0.0, 1.0])
