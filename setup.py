@@ -107,6 +107,7 @@ setup(
             'planner_node = flat_planner_ros.programs:planner_node',
             'plant_node = flat_planner_ros.programs:plant_node',
             'monitor_node = flat_planner_ros.programs:monitor_node',
+            'tracker_node = flat_planner_ros.programs:tracker_node',
             'record = flat_planner_ros.programs:record',
             'analyse = flat_planner_ros.programs:analyse',
             'identify = flat_planner_ros.programs:identify',

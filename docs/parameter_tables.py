@@ -20,7 +20,7 @@ from pathlib import Path
 import re
 import sys
 
-from flat_planner_ros.ros.parameters import monitor, planner, plant
+from flat_planner_ros.ros.parameters import monitor, planner, plant, tracker
 from flat_planner_ros.ros.parameters.arm_model import MODEL_ROWS
 from flat_planner_ros.ros.parameters.row import Row
 
@@ -30,7 +30,12 @@ PAGE = Path(__file__).resolve().parent / 'interfaces.md'
 MARKED = re.compile(r'(<!-- parameters: (\w+) -->\n).*?(<!-- end -->)', re.DOTALL)
 """A table on the page, between two comments."""
 
-TABLES = {'planner': planner.ROWS, 'plant': plant.ROWS, 'monitor': monitor.ROWS}
+TABLES = {
+    'planner': planner.ROWS,
+    'plant': plant.ROWS,
+    'monitor': monitor.ROWS,
+    'tracker': tracker.ROWS,
+}
 """Parameters by node."""
 
 HEADER = '| parameter | default | allowed | meaning |\n|---|---|---|---|\n'

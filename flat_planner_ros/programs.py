@@ -46,6 +46,11 @@ def monitor_node() -> int:
     return _run('nodes.monitor_node')
 
 
+def tracker_node() -> int:
+    """Run the tracker node."""
+    return _run('nodes.tracker_node')
+
+
 def demo() -> int:
     """Run the three nodes."""
     return _run('programs.demo')

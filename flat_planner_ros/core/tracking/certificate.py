@@ -60,6 +60,15 @@ class Certificate(NamedTuple):
     margin: float
     worst: tuple[float, float, float]
 
+    @property
+    def sentence(self) -> str:
+        """Return it in words."""
+        k, c, inertia = self.worst
+        return (
+            f'slowest decay {self.decay_rate:.3g} 1/s, margin {self.margin:.3g} with stiffness, '
+            f'damping and inertia times {k:g}, {c:g} and {inertia:g}'
+        )
+
 
 class SampledLoop:
     """

@@ -93,7 +93,7 @@ class TrackerSettings:
     """
 
     rate: float = 500.0
-    delay: float = 0.0
+    delay: float = 0.001
     bandwidth: float = 0.0
     relative_bandwidth: float = 1.5
     damping: float = 0.75

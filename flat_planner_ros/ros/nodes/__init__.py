@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Nodes: planner, plant and monitor, and what keeps them alive."""
+"""Nodes: planner, plant, monitor and tracker, and what keeps them alive."""

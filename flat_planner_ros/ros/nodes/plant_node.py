@@ -76,11 +76,15 @@ class PlantNode(Node):
 
     def _listen(self) -> None:
         """Subscribe to what moves the arm."""
+        is_tracked = self._settings.command_input is CommandInput.TRACKER
+        sender = interfaces.TRACKER if is_tracked else interfaces.PLANNER
+        efforts = (interfaces.EFFORT_COMMANDS, Float64MultiArray, self._on_effort)
         topic, kind, callback = {
             CommandInput.TRAJECTORY: (interfaces.COMMAND, JointTrajectory, self._on_trajectory),
-            CommandInput.EFFORT: (interfaces.EFFORT_COMMANDS, Float64MultiArray, self._on_effort),
+            CommandInput.EFFORT: efforts,
+            CommandInput.TRACKER: efforts,
         }[self._settings.command_input]
-        name = interfaces.topic_of(interfaces.PLANNER, topic)
+        name = interfaces.topic_of(sender, topic)
         # As bytes: the points of a long command would take a second to become Python objects.
         raw = callback == self._on_trajectory
         self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)

@@ -28,6 +28,7 @@ class CommandInput(Enum):
 
     TRAJECTORY = 'trajectory'
     EFFORT = 'effort'
+    TRACKER = 'tracker'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +105,7 @@ ROWS = [
         CommandInput.TRAJECTORY,
         '',
         'what moves the plant: flat_planner/joint_trajectory or .../effort_commands',
+        'tracker = flat_tracker/effort_commands',
         read_only=True,
     ),
     Row(

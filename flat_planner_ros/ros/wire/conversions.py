@@ -168,9 +168,9 @@ def planned_motion(points: PointTable) -> PlannedMotion:
         joint_names=points.joint_names,
         start=points.stamp,
         times=points.times,
-        positions=_table(points, 'positions'),
-        velocities=_optional_table(points, 'velocities'),
-        efforts=_optional_table(points, 'effort'),
+        positions=points.table('positions'),
+        velocities=points.optional_table('velocities'),
+        efforts=points.optional_table('effort'),
     )
 
 
@@ -201,13 +201,13 @@ def effort_profile(
     if sorted(names) not in (sorted(joints), sorted(joints[:-1])):
         raise InvalidCommand(f'joints are {names}, expected {list(joints)}')
     try:
-        efforts = _optional_table(points, 'effort')
+        efforts = points.optional_table('effort')
         if efforts is None:
             needed = 'effort' if drive is Drive.EFFORT else 'positions'
-            efforts = np.zeros(_table(points, needed).shape)
-        positions = _optional_table(points, 'positions')
-        velocities = _optional_table(points, 'velocities')
-        accelerations = _optional_table(points, 'accelerations')
+            efforts = np.zeros(points.table(needed).shape)
+        positions = points.optional_table('positions')
+        velocities = points.optional_table('velocities')
+        accelerations = points.optional_table('accelerations')
     except InvalidRequest as error:
         raise InvalidCommand(str(error)) from error
     if joints[-1] in names and efforts[:, names.index(joints[-1])].any():
@@ -309,20 +309,3 @@ def _stamp(msg: JointTrajectory | JointState) -> float | None:
 def _first_line(error: Exception) -> str:
     """Return what an error says, in one line."""
     return str(error).partition('\n')[0]
-
-
-def _table(points: PointTable, field: str) -> FloatArray:
-    """Return one field of all points, shape (points, joints)."""
-    if field in points.misfits:
-        raise InvalidRequest(points.misfits[field])
-    table, count = points.fields[field], len(points.joint_names)
-    if len(table) and table.shape[1] != count:
-        raise InvalidRequest(f'point 0 has {table.shape[1]} {field} for {count} joints')
-    return table.reshape(len(table), count)
-
-
-def _optional_table(points: PointTable, field: str) -> FloatArray | None:
-    """Return one field of all points, None where no point has it."""
-    if field in points.fields and not points.fields[field].shape[1]:
-        return None
-    return _table(points, field)

@@ -25,6 +25,7 @@ from rclpy.qos import (
 PLANNER = 'flat_planner'
 PLANT = 'flat_plant'
 MONITOR = 'flat_monitor'
+TRACKER = 'flat_tracker'
 
 JOINT_STATES = 'joint_states'
 CLOCK = '/clock'
@@ -43,6 +44,7 @@ STOP = '~/stop'
 ADOPT = '~/adopt_estimate'
 
 RESET = '~/reset'
+RELEASE = '~/release'
 RESIDUAL = '~/residual'
 REPORT = '~/report'
 

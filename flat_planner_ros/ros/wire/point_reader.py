@@ -23,7 +23,7 @@ form is left to the middleware.
 from struct import Struct, unpack_from
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
 import numpy as np
 
@@ -64,6 +64,21 @@ class PointTable(NamedTuple):
     times: FloatArray
     fields: dict[str, FloatArray]
     misfits: dict[str, str]
+
+    def table(self, field: str) -> FloatArray:
+        """Return one field of all points, shape (points, joints); InvalidRequest if it misfits."""
+        if field in self.misfits:
+            raise InvalidRequest(self.misfits[field])
+        table, count = self.fields[field], len(self.joint_names)
+        if len(table) and table.shape[1] != count:
+            raise InvalidRequest(f'point 0 has {table.shape[1]} {field} for {count} joints')
+        return table.reshape(len(table), count)
+
+    def optional_table(self, field: str) -> FloatArray | None:
+        """Return one field of all points, None where no point has it."""
+        if field in self.fields and not self.fields[field].shape[1]:
+            return None
+        return self.table(field)
 
 
 class _Unusual(Exception):

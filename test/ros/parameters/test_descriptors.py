@@ -19,7 +19,8 @@ import re
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
-from flat_planner_ros.ros.parameters import monitor, planner, plant
+from flat_planner_ros.ros.nodes.tracker_node import TrackerNode
+from flat_planner_ros.ros.parameters import monitor, planner, plant, tracker
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters
@@ -28,6 +29,7 @@ NODES = {
     'flat_planner': (PlannerNode, planner),
     'flat_plant': (PlantNode, plant),
     'flat_monitor': (MonitorNode, monitor),
+    'flat_tracker': (TrackerNode, tracker),
 }
 WITHOUT_UNIT = {
     'weights.r': 'its unit is what makes r^8 tau^2 one of the jerk-like term',

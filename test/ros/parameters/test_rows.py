@@ -23,7 +23,8 @@ from flat_planner_ros.core.monitor import MonitorSettings
 from flat_planner_ros.core.planning import JointLimits, PlanningOptions
 from flat_planner_ros.core.plant import SimulationSettings
 from flat_planner_ros.core.session import SessionSettings
-from flat_planner_ros.ros.parameters import monitor, planner, plant
+from flat_planner_ros.core.tracking import TrackerSettings
+from flat_planner_ros.ros.parameters import monitor, planner, plant, tracker
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row
 import pytest
@@ -74,6 +75,11 @@ def test_a_monitor_expects_the_resonance_of_the_drive():
         assert settings.expected_frequency == pytest.approx(
             sqrt(3.0e-3 / inertia * (1.0 - settings.expected_damping_ratio**2)) / (2.0 * pi)
         )
+
+
+def test_a_tracker_without_parameters_has_the_defaults_of_the_core():
+    settings = read_settings(None, tracker.ROWS, tracker.build, node='flat_tracker')
+    assert_equal_but_for([], settings.tracker, TrackerSettings())
 
 
 def test_a_choice_is_a_member_of_its_enumeration():

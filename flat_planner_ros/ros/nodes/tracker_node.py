@@ -1,0 +1,132 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tracker node: feedback of all joints around planned motions (docs/interfaces.md)."""
+
+from collections.abc import Sequence
+import sys
+from typing import Any
+
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray
+from flat_planner_ros.core.tracking import Tracker
+from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
+from flat_planner_ros.ros.parameters.tracker import build, ROWS
+from flat_planner_ros.ros.wire import conversions, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.tracked_motion import tracked_motion
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+LOOKS = 4
+"""Looks for silence in the time that joint states may be silent."""
+
+LATE_LOOK = 2.0
+"""Looks that come later, in terms of their period, say nothing: samples may be waiting [-]."""
+
+WARNING_PERIOD = 1.0
+"""Shortest time between two warnings about the same input [s]."""
+
+
+class TrackerNode(Node):
+    """Turns the planner's command and joint states into efforts."""
+
+    def __init__(self, **options: Any) -> None:
+        """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
+        super().__init__(interfaces.TRACKER, **options)
+        # Everything is fixed at the start: other gains are for an arm that is let go.
+        settings = NodeParameters(self, ROWS, build, lambda _: None).settings
+        self._joints = settings.joints
+        self._tracker = Tracker(settings.arm, settings.tracker)
+        self._reader = JointStateReader(settings.joints)
+        efforts = interfaces.EFFORT_COMMANDS
+        self._efforts = self.create_publisher(Float64MultiArray, efforts, interfaces.RELIABLE)
+        command = interfaces.topic_of(interfaces.PLANNER, interfaces.COMMAND)
+        states, listen = interfaces.JOINT_STATES, self.create_subscription
+        # As bytes: the points of a long command would take a second to become Python objects.
+        listen(JointTrajectory, command, self._on_command, interfaces.RELIABLE, raw=True)
+        listen(JointState, states, self._on_measured, interfaces.SENSOR_DATA)
+        self._watch = GraphWatch(self, [efforts, command], [states], is_listening=True)
+        self.create_service(Trigger, interfaces.RELEASE, self._on_release)
+        # A simulated clock can stand still; the effort must not hang on it.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._looked = stamps.now(self._steady)
+        self._look_period = settings.tracker.timeout / LOOKS
+        self.create_timer(self._look_period, self._on_look, clock=self._steady)
+        self.get_logger().info(f'certified: {self._tracker.certificate.sentence}')
+
+    def _now(self) -> float:
+        """Return the node's time [s]."""
+        return stamps.now(self.get_clock())
+
+    def _on_command(self, data: bytes) -> None:
+        """Follow a motion; one that cannot be followed leaves the present one alone."""
+        now = self._now()
+        try:
+            points = conversions.points_of(data)
+            self._tracker.follow(tracked_motion(points, self._joints, now), now)
+        except FlatPlannerError as error:
+            self.get_logger().warning(f'command ignored: {error}')
+
+    def _on_measured(self, msg: JointState) -> None:
+        """Answer the samples that a message completes with efforts."""
+        try:
+            samples = self._reader.read(msg, self._now)
+        except FlatPlannerError as error:
+            self._watch.heard_other_part()
+            self.get_logger().warning(
+                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
+            )
+            return
+        if self._reader.is_in_parts:
+            self._watch.heard_other_part()
+        for remark in self._reader.take_remarks():
+            self.get_logger().warning(remark)
+        for sample in samples:
+            self._send(self._tracker.hear(sample, max(self._now(), sample.time)))
+
+    def _on_look(self) -> None:
+        """Notice silence, and go on with an effort that fades."""
+        steady = stamps.now(self._steady)
+        elapsed, self._looked = steady - self._looked, steady
+        if elapsed <= LATE_LOOK * self._look_period:
+            self._send(self._tracker.watch(self._now()))
+
+    def _on_release(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Let the arm go."""
+        self._tracker.release(self._now())
+        response.success, response.message = True, 'the effort goes to zero; idle until a command'
+        return response
+
+    def _send(self, efforts: FloatArray | None) -> None:
+        """Publish efforts, if there are any, and say why tracking was given up, if it was."""
+        if efforts is not None:
+            self._efforts.publish(conversions.effort_msg(efforts))
+        fault = self._tracker.take_fault()
+        if fault:
+            self.get_logger().error(fault)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the tracker node."""
+    return run([TrackerNode], args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
