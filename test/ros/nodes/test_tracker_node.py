@@ -16,14 +16,11 @@
 
 from math import pi, tau
 
-from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 import numpy as np
-from ros.world import EVERY_VERDICT, goal, move, Observer, stamp, START_DELAY, STATUS
-from sensor_msgs.msg import JointState
+from ros.rig import Rig, stamp, START_DELAY
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import JointTrajectory
 
 EFFORTS = '/flat_tracker/effort_commands'
 
@@ -43,19 +40,17 @@ def arguments(values):
     return ['--ros-args', *(part for pair in given for part in pair)]
 
 
-class Tracked(Observer):
+class Tracked(Rig):
     """A planner in the test, a plant and a tracker in processes of their own."""
 
-    def __init__(self, graph, *, heard='joint_states', **mismatch):
+    def __init__(self, graph, **mismatch):
         """Start them and wait for the first joint state."""
-        self.graph = graph
-        self.states = graph.collect(JointState, 'joint_states', matched=False)
-        self.sent = graph.collect(Float64MultiArray, EFFORTS, matched=False)
-        self.status = graph.collect(DiagnosticArray, STATUS, EVERY_VERDICT, matched=False)
-        self.plans = graph.collect(JointTrajectory, '/flat_planner/plan', matched=False)
-        self.heard = heard
+        super().__init__(graph)
+        self.sent = self.hear(Float64MultiArray, EFFORTS, matched=False)
+        self.hear_plant(matched=False)
         settings = {'start_delay': START_DELAY, 'use_sim_time': True}
         self.planner = graph.create(PlannerNode, settings)
+        self.hear_planner()
         self.plant = graph.start('plant_node', *arguments({**PLANT, **mismatch}))
         self.start_tracker()
         graph.expect(lambda: self.states, 'a joint state')
@@ -63,16 +58,8 @@ class Tracked(Observer):
     def start_tracker(self):
         """Start a tracker and wait until it hears commands."""
         ready = len(self.graph.logged('certified'))
-        remapping = ('-r', f'joint_states:={self.heard}')
-        self.tracker = self.graph.start('tracker_node', *arguments(TRACKER), *remapping)
+        self.tracker = self.graph.start('tracker_node', *arguments(TRACKER))
         self.graph.expect(lambda: len(self.graph.logged('certified')) > ready, 'a tracker')
-
-    def move(self, position):
-        """Send a goal; return when its motion ends [s]."""
-        count = len(self.plans)
-        move(self.graph, self.status, goal(position))
-        self.graph.expect(lambda: len(self.plans) > count, 'its plan')
-        return stamp(self.plans[-1]) + 1.0
 
     def pass_time(self, duration):
         """Let simulated time [s] pass."""
@@ -89,18 +76,18 @@ def test_nothing_is_sent_before_a_command_and_wrong_inertias_end_at_the_goal(gra
     arm = Tracked(graph, **{'mismatch.inertia_scale': 1.1})
     arm.pass_time(0.3)
     assert not arm.sent
-    end = arm.move(pi)
-    arm.wait_until(end + 1.2)
+    arm.move(pi)
+    arm.wait_until(arm.end + 1.2)
     assert arm.sent
-    assert (arm.errors(end + 0.9, pi) < 5e-3).all()
+    assert (arm.errors(arm.end + 0.9, pi) < 5e-3).all()
     assert not graph.logged('given up')
 
 
 def test_after_a_restart_nothing_is_sent_and_nothing_moves(graph):
     """Friction keeps the arm from drifting on with what the last effort gave it."""
     arm = Tracked(graph, **{'friction.coulomb': '[0.0005]'})
-    end = arm.move(1.0)
-    arm.wait_until(end + 0.2)
+    arm.move(1.0)
+    arm.wait_until(arm.end + 0.2)
     arm.tracker.kill()
     arm.pass_time(0.3)  # the plant has let go of the last effort
     arm.start_tracker()
@@ -114,8 +101,8 @@ def test_after_a_restart_nothing_is_sent_and_nothing_moves(graph):
 
 def test_released_the_arm_is_let_go_until_the_next_command(graph):
     arm = Tracked(graph)
-    end = arm.move(0.5)
-    arm.wait_until(end + 0.1)
+    arm.move(0.5)
+    arm.wait_until(arm.end + 0.1)
     answer = graph.call(Trigger, '/flat_tracker/release')
     assert answer.success
     arm.pass_time(0.3)
@@ -123,29 +110,10 @@ def test_released_the_arm_is_let_go_until_the_next_command(graph):
     arm.pass_time(0.2)
     assert len(arm.sent) == count
     assert arm.sent[-1].data[0] == 0.0
-    end = arm.move(0.0)
-    arm.wait_until(end + 0.3)
+    arm.move(0.0)
+    arm.wait_until(arm.end + 0.3)
     assert len(arm.sent) > count
-    assert (arm.errors(end + 0.2, 0.0) < 5e-3).all()
-
-
-def test_joint_states_that_stop_end_in_one_error_and_zero_effort(graph):
-    passed_on = graph.probe.create_publisher(JointState, 'passed_on', 10)
-    is_open = [True]
-
-    def pass_on(msg):
-        if is_open[0]:
-            passed_on.publish(msg)
-
-    graph.probe.create_subscription(JointState, 'joint_states', pass_on, 10)
-    arm = Tracked(graph, heard='passed_on')
-    arm.wait_until(arm.move(pi) - 0.7)
-    is_open[0] = False
-    graph.expect(lambda: graph.logged('given up'), 'an error')
-    arm.pass_time(0.3)
-    assert arm.sent[-1].data[0] == 0.0
-    (error,) = graph.logged('given up')
-    assert 'the last joint sample is' in error
+    assert (arm.errors(arm.end + 0.2, 0.0) < 5e-3).all()
 
 
 def test_a_motor_too_weak_for_the_motion_ends_in_one_error(graph):
