@@ -22,6 +22,9 @@ from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline
 import numpy as np
 
+AHEAD = 0.2
+"""How far ahead of the present a state may be stamped, relative to the age that is stale [-]."""
+
 
 class MotionStart(NamedTuple):
     """
@@ -223,15 +226,21 @@ def _fresh(measured: JointSample | None, limit: float, now: float, lack: str) ->
         raise RequestRejected(
             Reason.START_STATE_UNKNOWN, lack or 'no joint state of this arm has been received yet'
         )
-    age = now - measured.time
-    if not -limit <= age <= limit:
+    age, ahead = now - measured.time, AHEAD * limit
+    if age < -ahead:
+        raise RequestRejected(
+            Reason.START_STATE_STALE,
+            f'the last joint state is stamped {-age:.3f} s ahead of the present, more than '
+            f'{ahead:g} s: the planner and its source must go by the same clock (use_sim_time; '
+            f'synchronised clocks of two computers)',
+            value=age,
+            limit=-ahead,
+        )
+    if not age <= limit:
         raise RequestRejected(
             Reason.START_STATE_STALE,
             f'the last joint state is {age:.3f} s old, more than {limit:g} s'
-            f'{": " if lack else ""}{lack}'
-            if age > 0.0
-            else f'the last joint state is stamped {-age:.3f} s ahead of the present: do the '
-            f'planner and its source go by the same clock (use_sim_time)?',
+            f'{": " if lack else ""}{lack}',
             value=age,
             limit=limit,
         )

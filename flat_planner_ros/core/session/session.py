@@ -44,7 +44,7 @@ from flat_planner_ros.core.session.motion_start import (
     motion_start,
     MotionStart,
 )
-from flat_planner_ros.core.session.settings import SessionSettings
+from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 import numpy as np
 
@@ -137,6 +137,26 @@ class PlannerSession:
         if not 0.0 < age <= self.settings.joint_state_timeout:
             self._measured = sample
 
+    def knows_start(self, now: float) -> bool:
+        """Tell whether goals can be judged: there is a time [s], and a state where one counts."""
+        is_measured = self.settings.start_source in (StartSource.AUTO, StartSource.MEASURED)
+        is_known = self._measured is not None or self._timeline.is_busy(now) or not is_measured
+        return now > 0.0 and is_known
+
+    def patience(self, goal: Goal) -> float:
+        """
+        Return how long a goal may wait until its start is known [s].
+
+        Raises
+        ------
+        RequestRejected
+            The goal breaks a rule whatever its start is.
+
+        """
+        asked = checked_goal(goal, self.settings.joints)
+        self.settings.checked_duration(asked.duration)
+        return self.settings.start_wait
+
     def submit(self, goal: Goal, now: float, clock: Clock | None = None) -> Motion:
         """
         Return the motion that answers a goal.
@@ -159,10 +179,10 @@ class PlannerSession:
             The settings allow no plan.
 
         """
-        _check_time(now)
         settings = self.settings
         asked = checked_goal(goal, settings.joints)
         duration = settings.checked_duration(asked.duration)
+        _check_time(now)
         start = self._start(goal.stamp, now)
         if start.running is not None:
             check_carried_out(settings, self._timeline, self._measured, now)

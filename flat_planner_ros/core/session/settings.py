@@ -76,6 +76,8 @@ class SessionSettings:
         Largest deviation of a measured start from rest at the planned one [rad, rad/s].
     joint_state_timeout
         Age from which a measured state is stale [s].
+    start_wait
+        Time that a goal may wait for the first measured state [s]; 0 for none.
     start_delay
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
@@ -105,6 +107,7 @@ class SessionSettings:
     position_tolerance: float = 0.01
     velocity_tolerance: float = 0.1
     joint_state_timeout: float = 0.5
+    start_wait: float = 2.0
     start_delay: float = 0.05
     lookahead: float = 0.1
     replan_tolerance: float = 0.5

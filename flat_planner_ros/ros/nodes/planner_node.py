@@ -26,6 +26,7 @@ from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import Goal, PlannerSession
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
+from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
@@ -51,6 +52,7 @@ class PlannerNode(Node):
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         self._reader = JointStateReader(self._joints, self._settings.joint_states)
+        self._goals = GoalQueue(self, self._session, self._answer)
         self._sent_start: float | None = None
         self._open_publishers()
         self._listen()
@@ -92,7 +94,7 @@ class PlannerNode(Node):
             (JointTrajectory, interfaces.GOAL, conversions.goal_from_trajectory),
             (JointState, interfaces.GOAL_STATE, conversions.goal_from_joint_state),
         ):
-            heard = partial(self._answer, read)
+            heard = partial(self._on_goal, read)
             self.create_subscription(kind, topic, heard, interfaces.BURST, raw=True)
         self.create_subscription(
             JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA
@@ -123,6 +125,10 @@ class PlannerNode(Node):
         self._reader.rules = settings.joint_states
         self._efforts.configure(settings.stream_effort, settings.session.period)
 
+    def _on_goal(self, read: Callable[[bytes], Goal], data: bytes) -> None:
+        """Answer a goal, now or once the arm has been heard."""
+        self._goals.put(partial(read, data))
+
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
         try:
@@ -138,6 +144,7 @@ class PlannerNode(Node):
             self._session.lack = self._reader.lack
         for remark in self._reader.take_remarks():
             self.get_logger().warning(remark)
+        self._goals.answer_due()
 
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Plan the last goal again."""
@@ -148,6 +155,7 @@ class PlannerNode(Node):
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Bring the arm to rest early."""
+        self._goals.answer_all()
         try:
             motion = self._session.stop(self._now(), self._now)
         except FlatPlannerError as error:
@@ -179,12 +187,12 @@ class PlannerNode(Node):
         for ended in self._session.take_ended(self._now()):
             self._publish_status(diagnostics.ended_status(ended))
 
-    def _answer(self, read: Callable[..., Goal], *data: bytes) -> DiagnosticStatus:
-        """Give the goal that is read from data exactly one verdict; carry it out if accepted."""
+    def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
+        """Give a goal exactly one verdict; carry it out if it is accepted."""
         goal = None
         started = perf_counter()
         try:
-            goal = read(*data)
+            goal = read()
             motion = self._session.submit(goal, self._now(), self._now)
         except RequestRejected as error:
             status = diagnostics.rejected_status(error, goal)

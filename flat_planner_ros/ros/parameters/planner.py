@@ -200,6 +200,15 @@ ROWS = [
         'age from which a joint state is stale',
         lower=0.0,
     ),
+    Row(
+        'start.wait',
+        SessionSettings.start_wait,
+        's',
+        'time that a goal waits for the first joint state before it is refused',
+        '0 = not at all',
+        lower=0.0,
+        upper=60.0,
+    ),
     *JOINT_STATE_ROWS,
     Row(
         'start_delay',
@@ -308,6 +317,7 @@ def build(values: Values) -> PlannerSettings:
         position_tolerance=values['start.position_tolerance'],
         velocity_tolerance=values['start.velocity_tolerance'],
         joint_state_timeout=values['start.joint_state_timeout'],
+        start_wait=values['start.wait'],
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
         replan_tolerance=values['replan.tolerance'],

@@ -534,6 +534,44 @@ def test_a_measurement_by_another_clock_is_no_start():
     assert 'use_sim_time' in str(error)
 
 
+@pytest.mark.parametrize(('ahead', 'is_accepted'), [(0.09, True), (0.2, False), (5.0, False)])
+def test_a_state_from_the_future_is_refused_with_its_offset(ahead, is_accepted):
+    planner = session()
+    planner.measure(sample(time=NOW + ahead))
+    if is_accepted:
+        assert planner.submit(GOAL, NOW)
+        return
+    error = reason_of(planner.submit, GOAL, NOW)
+    assert error.reason is Reason.START_STATE_STALE
+    assert (error.value, error.limit) == pytest.approx((-ahead, -0.1))
+    assert f'stamped {ahead:.3f} s ahead of the present, more than 0.1 s' in str(error)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'is_known'),
+    [
+        ({}, False),
+        ({'start_source': StartSource.PARAMETER, 'start_position': (0.0, 0.0)}, True),
+        ({'start_source': StartSource.REFERENCE}, True),
+    ],
+)
+def test_only_goals_that_need_a_measured_state_wait_for_it(changes, is_known):
+    planner = PlannerSession(replace(SETTINGS, **changes))
+    assert planner.knows_start(NOW) is is_known
+    assert not planner.knows_start(0.0)
+    planner.measure(sample())
+    assert planner.knows_start(NOW)
+    assert planner.patience(GOAL) == SETTINGS.start_wait
+
+
+def test_goals_that_break_a_rule_need_not_wait():
+    planner = PlannerSession(SETTINGS)
+    assert reason_of(planner.patience, replace(GOAL, points=())).reason is Reason.EMPTY_GOAL
+    assert (
+        reason_of(planner.patience, replace(GOAL, points=(GoalPoint(time=0.0, positions=(1.0,)),)))
+    ).reason is Reason.DURATION_OUT_OF_RANGE
+
+
 def test_nothing_starts_before_there_is_a_time():
     error = reason_of(session().submit, GOAL, 0.0)
     assert error.reason is Reason.START_STATE_UNKNOWN

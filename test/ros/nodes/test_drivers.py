@@ -23,6 +23,7 @@ from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 STATES = '/joint_states'
@@ -70,8 +71,39 @@ class Drivers:
         return values(self.status[count])
 
 
+def test_goals_before_the_first_joint_state_wait_for_it_and_keep_their_order(graph):
+    drivers = Drivers(graph, **{'start.wait': 60.0})
+    for angle in (1.0, 2.0):
+        graph.publish('/flat_planner/goal', goal(angle))
+    wrong = goal(duration=0.0)
+    graph.publish('/flat_planner/goal', wrong)
+    # The parameter services answer after all that came before.
+    graph.get_parameters('flat_planner', 'start.wait')
+    assert not drivers.status
+    drivers.publish(joint1=0.25, joint2=0.0)
+    graph.expect(lambda: len(drivers.status) >= 4, 'three verdicts and a preemption')
+    verdicts = [v for v in map(values, drivers.status) if 'goal.positions' in v]
+    assert [v['goal.positions'] for v in verdicts] == ['[1]', '[2]', f'[{pi:.9g}]']
+    assert [v['state'] for v in verdicts] == ['ACCEPTED', 'ACCEPTED', 'REJECTED']
+
+
+def test_a_goal_waits_no_longer_than_told_and_one_that_breaks_a_rule_not_at_all(graph):
+    drivers = Drivers(graph, **{'start.wait': 0.1})
+    refusal = drivers.send(goal())
+    assert refusal['error_name'] == 'START_STATE_UNKNOWN'
+    graph.set_parameters('flat_planner', **{'start.wait': 60.0})
+    assert drivers.send(goal(duration=0.0))['error_name'] == 'DURATION_OUT_OF_RANGE'
+    count = len(drivers.status)
+    graph.publish('/flat_planner/goal', goal())
+    graph.get_parameters('flat_planner', 'start.wait')
+    assert len(drivers.status) == count
+    graph.call(Trigger, '/flat_planner/stop')
+    graph.expect(lambda: len(drivers.status) > count, 'a verdict')
+    assert values(drivers.status[count])['error_name'] == 'START_STATE_UNKNOWN'
+
+
 def test_goals_start_from_joint_states_in_parts(graph):
-    drivers = Drivers(graph)
+    drivers = Drivers(graph, **{'start.wait': 0.0})
     drivers.publish(joint1=0.25)
     graph.expect(lambda: graph.logged('joint states come in parts'), 'the first part')
     refusal = drivers.send(goal())
