@@ -38,6 +38,7 @@ WINGS = {
     'arm': '',
     'motion_law': 'arm',
     'insensitive': 'motion_law arm',
+    'peak': 'motion_law arm',
     'planning': 'motion_law insensitive arm',
     'session': 'planning arm',
     'plant': 'arm',

@@ -1,0 +1,147 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The linear programme of least peak, and what its dual values prove.
+
+With the drive over its peak as unknown, v = u / M, and y = 1 / M, all conditions are homogeneous:
+the least peak is the largest y with A v = b y and |v| <= 1 ((B6) of docs/derivation.md).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import FloatArray
+import numpy as np
+
+FEASIBILITY = 1e-10
+"""What the solver forgives, the least it can be told [-]."""
+
+FREE = 1e-6
+"""Distance of a coefficient from its bound from which it may correct the rest [-]."""
+
+RANK = 1e-12
+"""Ratio of singular values below which a condition is not corrected [-]."""
+
+
+class PeakSolution(NamedTuple):
+    """
+    Solution of the programme.
+
+    Attributes
+    ----------
+    coefficients
+        Of the drive, shape (size,).
+    multipliers
+        Dual values p of the conditions, up to a common factor, shape (r,).
+    cap_multipliers
+        Those of the bounded quantities, up to the same factor, shape (s,).
+
+    """
+
+    coefficients: FloatArray
+    multipliers: FloatArray
+    cap_multipliers: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PeakProgramme:
+    """
+    Conditions of a motion in the coefficients v of its drive over the peak.
+
+    Attributes
+    ----------
+    rows
+        A, what the free coefficients add to the state at the end, shape (r, size).
+    target
+        b, what they have to add for a peak of 1, shape (r,).
+    caps
+        C, quantities that are bounded in magnitude, shape (s, size).
+    cap_target
+        What each has already for a peak of 1, shape (s,).
+    cap_limits
+        Their bounds, shape (s,).
+
+    """
+
+    rows: FloatArray
+    target: FloatArray
+    caps: FloatArray
+    cap_target: FloatArray
+    cap_limits: FloatArray
+
+    def solve(self) -> 'PeakSolution | None':
+        """Return the coefficients of least peak; None where no motion meets the bounds."""
+        from scipy.optimize import linprog
+
+        # Orthonormal: in a fast motion the rows of the swing are nearly those of a rigid link.
+        orthonormal, triangle = np.linalg.qr((self.rows / self._sizes[:, None]).T)
+        rows = orthonormal.T
+        target = np.linalg.solve(triangle.T, self.target / self._sizes)
+        # No drive of peak 1 reaches further: y in these units is at most about 1.
+        unit = float(np.max(np.abs(target) / np.abs(rows).sum(axis=1)))
+        equations = np.column_stack([rows, -target / unit])
+        inequalities, cap_sizes = self._inequalities(unit)
+        bounds = [(-1.0, 1.0)] * rows.shape[1] + [(0.0, None)]
+        found = linprog(
+            -np.eye(rows.shape[1] + 1)[-1],
+            A_ub=inequalities,
+            b_ub=np.zeros(len(inequalities)),
+            A_eq=equations,
+            b_eq=np.zeros(len(rows)),
+            bounds=bounds,
+            method='highs-ds',
+            options={
+                'primal_feasibility_tolerance': FEASIBILITY,
+                'dual_feasibility_tolerance': FEASIBILITY,
+            },
+        )
+        if found.x is None or not found.x[-1] > 0.0:
+            return None
+        share, least = found.x[:-1], found.x[-1] / unit
+        # What the solver forgives is corrected: first where there is room, then everywhere.
+        free = 1.0 - np.abs(share) > FREE
+        worth = np.column_stack([rows[:, free], -target])
+        change = np.linalg.lstsq(worth, target * least - rows @ share, rcond=RANK)[0]
+        share[free] += change[:-1]
+        least += float(change[-1])
+        share += rows.T @ (target * least - rows @ share)
+        duals = found.eqlin.marginals
+        if not len(self.caps):
+            # The same for the dual values: a coefficient within its bounds is worth nothing.
+            miss = np.append(rows[:, free].T @ duals, 0.0)
+            duals = duals - np.linalg.lstsq(worth.T, miss, rcond=RANK)[0]
+        above, below = np.split(found.ineqlin.marginals / cap_sizes, 2)
+        multipliers = np.linalg.solve(triangle, duals) / self._sizes
+        return PeakSolution(share / least, multipliers, below - above)
+
+    @property
+    def _sizes(self) -> FloatArray:
+        """Return the size of each row, shape (r,)."""
+        sizes: FloatArray = np.linalg.norm(self.rows, axis=1)
+        return sizes
+
+    def proven_peak(self, solution: PeakSolution) -> float:
+        """Return the peak below which no coefficients meet the conditions, by dual values."""
+        p, of_caps = solution.multipliers, solution.cap_multipliers
+        gain = p @ self.target + of_caps @ self.cap_target - np.abs(of_caps) @ self.cap_limits
+        return float(gain / np.abs(p @ self.rows - of_caps @ self.caps).sum())
+
+    def _inequalities(self, unit: float) -> tuple[FloatArray, FloatArray]:
+        """Return the bounded quantities as rows of at most zero, and their sizes."""
+        above = np.column_stack([self.caps, (self.cap_target - self.cap_limits) / unit])
+        below = np.column_stack([-self.caps, (-self.cap_target - self.cap_limits) / unit])
+        both = np.concatenate([above, below])
+        sizes = np.abs(both).max(axis=1)
+        return both / sizes[:, None], sizes
