@@ -105,7 +105,7 @@ class LinearEffortLaw:
 
     @property
     def knots(self) -> FloatArray:
-        """Return the times between which the law is smooth, and both ends, shape (pieces + 1,) [s]."""
+        """Return the times between which the law is smooth, with both ends, shape (m,) [s]."""
         pieces = self.series.shape[1]
         times: FloatArray = np.arange(pieces + 1.0) / pieces * self.duration
         return times
