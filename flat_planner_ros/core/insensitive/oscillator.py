@@ -67,8 +67,8 @@ class Oscillator:
     inertia_ratio
         I*_(n-1) / I*_n [-].
     gain
-        Acceleration of link n-1 for each unit of what drives it: 1 / (I*_(n-1) - I*_n) for an
-        effort [1/(kg m^2)], 1 for an acceleration [-].
+        Acceleration of link n-1 for each unit of effort, 1 / (I*_(n-1) - I*_n) [1/(kg m^2)], or of
+        what a servo gives to it, 1 [-].
     drive
         Which of the two.
 

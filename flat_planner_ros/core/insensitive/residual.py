@@ -78,8 +78,8 @@ def residual_amplitude(
         The arm; only its gain enters, as the poles bring the rest.
     signal
         What drives link n-1 at even times, both ends included, zero at the last: the effort of
-        joint n-1, friction left out [N m], or the link's acceleration in absolute angle
-        [rad/s^2]; shape (m,).
+        joint n-1, friction left out [N m], or the link's velocity in absolute angle [rad/s];
+        shape (m,).
     duration
         From the first to the last [s].
     poles
@@ -94,8 +94,8 @@ def residual_amplitude(
 
     References
     ----------
-    (I3) of docs/derivation.md: exact for efforts that are linear between the samples; smooth
-    accelerations that begin and end at 0 by the trapezoidal rule, which converges fastest there.
+    (I3) of docs/derivation.md: exact for efforts that are linear between the samples; velocities
+    by the trapezoidal rule, which converges fast for motions that begin and end smoothly.
 
     """
     step = duration / (len(signal) - 1)
@@ -106,28 +106,31 @@ def residual_amplitude(
     fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
     coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
     total = np.einsum('rp,rp->p', padded.reshape(rows, BLOCK) @ fine, coarse)
-    hat, half_hat = _weights(oscillator.drive, turn)
-    driven = -step * oscillator.gain * hat * total
+    inner, first, jump = _weights(oscillator, poles, step)
+    driven = -inner * total
     angle, velocity = start
     if angle or velocity or signal[0]:
-        # In motion: the first sample has half a hat, and the joint brings its own oscillation.
-        missing = (hat - half_hat) * signal[0] * step * oscillator.gain
+        # In motion: the first sample weighs less, and the joint brings its own oscillation.
         free = velocity - poles.conj() * angle
-        driven += np.exp(duration * poles) * (free + missing)
+        driven += np.exp(duration * poles) * (free + (inner - first + jump) * signal[0])
     amplitudes: FloatArray = np.abs(driven) / poles.imag
     return amplitudes
 
 
 def _weights(
-    drive: Drive, turn: ComplexArray
-) -> tuple[ComplexArray | float, ComplexArray | float]:
-    """Return the weight of a sample between others, and of the first one."""
-    if drive is Drive.POSITION:
-        return 1.0, 0.5
-    return (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2, (np.expm1(-turn) + turn) / turn**2
+    oscillator: Oscillator, poles: ComplexArray, step: float
+) -> tuple[ComplexArray, ComplexArray, float]:
+    """Return weights of a sample between others, of the first one, and of a velocity there."""
+    turn = step * poles
+    if oscillator.drive is Drive.POSITION:
+        # By parts: the velocity is smoother than the acceleration, whose rise may be abrupt.
+        return turn, 0.5 * turn, 1.0
+    hat, half_hat = (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2, (np.expm1(-turn) + turn) / turn**2
+    scale = step * oscillator.gain
+    return scale * hat, scale * half_hat, 0.0
 
 
-def servo_effort(arm: PlanarArm, acceleration: FloatArray, duration: float) -> FloatArray:
+def servo_effort(arm: PlanarArm, velocity: FloatArray, duration: float) -> FloatArray:
     """
     Return the effort that a servo needs, the passive joint's reaction in it.
 
@@ -135,8 +138,8 @@ def servo_effort(arm: PlanarArm, acceleration: FloatArray, duration: float) -> F
     ----------
     arm
         Nominal model; must be flat.
-    acceleration
-        Of link n-1 in absolute angle at even times, both ends included, shape (m,) [rad/s^2].
+    velocity
+        Of link n-1 in absolute angle at even times, both ends included, shape (m,) [rad/s].
     duration
         From the first to the last [s].
 
@@ -147,21 +150,20 @@ def servo_effort(arm: PlanarArm, acceleration: FloatArray, duration: float) -> F
 
     """
     (pole,) = Oscillator.of(arm, Drive.POSITION).poles(np.ones((1, 2)))
-    turn = pole * duration / (len(acceleration) - 1)
-    # Exact for accelerations that are linear between the samples.
-    passed = np.expm1(turn)
-    late = (passed - turn) / turn / pole
-    pushes = acceleration[:-1] * (passed / pole - late) + acceleration[1:] * late
-    states, state, decay = [0j], 0j, complex(passed + 1.0)
+    step = duration / (len(velocity) - 1)
+    # Exact for velocities that are linear between the samples.
+    decay = complex(np.exp(step * pole))
+    pushes = np.diff(velocity) * (decay - 1.0) / (step * pole)
+    state, states = 0j, [0j]
     for push in pushes.tolist():
         state = decay * state - push
         states.append(state)
     swing = np.array(states)
     angle = swing.imag / pole.imag
-    velocity = swing.real + pole.real * angle
+    rate = swing.real + pole.real * angle
     both, last = arm.inertia_star
-    effort: FloatArray = (both - last) * acceleration
-    effort -= arm.stiffness * angle + arm.damping * velocity
+    effort: FloatArray = (both - last) * np.gradient(velocity, step)
+    effort -= arm.stiffness * angle + arm.damping * rate
     return effort
 
 
@@ -205,7 +207,7 @@ def predict_residual(
         Nominal model.
     signal
         What drives link n-1 at even times, as for `residual_amplitude`, shape (m,) [N m] or
-        [rad/s^2].
+        [rad/s].
     duration
         Length of the motion [s].
     box

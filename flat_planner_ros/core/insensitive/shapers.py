@@ -69,7 +69,7 @@ def shaped_quintic(
     Returns
     -------
     FloatArray
-        Effort of joint n-1 [N m], or acceleration of link n-1 [rad/s^2], shape (m,).
+        Effort of joint n-1 [N m], or velocity of link n-1 [rad/s], shape (m,).
 
     Raises
     ------
@@ -100,7 +100,10 @@ def shaped_quintic(
     for copy in range(copies):
         share = comb(copies - 1, copy) * ratio**copy / (1.0 + ratio) ** (copies - 1)
         u = np.clip((times - copy * delay) / base, 0.0, 1.0)
-        # Second derivative of 10 u^3 - 15 u^4 + 6 u^5, zero at both ends and beyond.
-        signal += share * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
-    signal *= distance / base**2
-    return signal if drive is Drive.POSITION else arm.inertia_star.both * signal
+        # First or second derivative of 10 u^3 - 15 u^4 + 6 u^5, zero at both ends and beyond.
+        if drive is Drive.POSITION:
+            signal += share * 30.0 * (u * (1.0 - u)) ** 2 / base
+        else:
+            inertia = arm.inertia_star.both
+            signal += share * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) * inertia / base**2
+    return distance * signal

@@ -93,9 +93,9 @@ class PlanSamples:
         return self._joints[2]
 
     @property
-    def driving_acceleration(self) -> FloatArray:
-        """Acceleration of link n-1 in absolute angle, which a servo gives it, (m,) [rad/s^2]."""
-        driving: FloatArray = self.accelerations[:, :-1].sum(axis=1)
+    def driving_velocity(self) -> FloatArray:
+        """Velocity of link n-1 in absolute angle, which a servo gives it, shape (m,) [rad/s]."""
+        driving: FloatArray = self.velocities[:, :-1].sum(axis=1)
         return driving
 
     @cached_property

@@ -120,14 +120,15 @@ def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> Predi
 
     """
     drive = planned.options.drive
-    if samples is None or drive is Drive.POSITION:
+    is_coarse = samples is None or len(samples.times) <= INTERVALS
+    if samples is None or (drive is Drive.POSITION and is_coarse):
         samples = planned.sample(planned.duration / INTERVALS)
     start = None
     if planned.request.start_jets is not None:
         start = (float(samples.positions[0, -1]), float(samples.velocities[0, -1]))
     return predict_residual(
         planned.problem.arm,
-        samples.driving_effort if drive is Drive.EFFORT else samples.driving_acceleration,
+        samples.driving_effort if drive is Drive.EFFORT else samples.driving_velocity,
         planned.duration,
         planned.options.insensitivity.box,
         start,

@@ -37,7 +37,7 @@ from flat_planner_ros.core.planning.request import MotionRequest, PlanningOption
 from flat_planner_ros.core.planning.tradeoff import baselines, residual_of_plan
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.interpolate import CubicSpline
 
 HEAVY = PlanarArm.reduced(inertia_star=(6.4e-4, 2.5e-4), stiffness=2.3e-2, damping=2.0e-5)
@@ -125,8 +125,9 @@ def driving(result, drive):
     """Return what drives joint n-1 in a plan, as a function of time."""
     samples = result.sample(result.duration / 2000.0)
     is_effort = drive is Drive.EFFORT
-    values = samples.driving_effort if is_effort else samples.driving_acceleration
-    return CubicSpline(samples.times, values)
+    values = samples.driving_effort if is_effort else samples.driving_velocity
+    spline = CubicSpline(samples.times, values)
+    return spline if is_effort else spline.derivative()
 
 
 def bump(times, duration):
@@ -143,7 +144,12 @@ def test_the_prediction_is_what_the_arm_does(arm, factors, drive):
     size = 0.01 if drive is Drive.EFFORT else 20.0
     state = swing(arm, drive, lambda t: size * bump(t, duration), duration, factors, start)
     oscillator = Oscillator.of(arm, drive)
-    signal = size * bump(np.linspace(0.0, duration, 2001), duration)
+    times = np.linspace(0.0, duration, 4001)
+    signal = size * bump(times, duration)
+    if drive is Drive.POSITION:
+        signal = cumulative_simpson(signal, x=times, initial=0.0)
+        # At rest at the end, as a motion is; the sines above bring the link to a speed.
+        signal -= signal[-1]
     poles = oscillator.poles(np.array([factors]))
     (predicted,) = residual_amplitude(oscillator, signal, duration, poles, start)
     assert predicted == pytest.approx(amplitude(arm, drive, factors, state), rel=1e-5)
@@ -160,7 +166,8 @@ def test_the_prediction_is_what_the_arm_does(arm, factors, drive):
 )
 def test_the_worst_of_a_box_is_on_its_edges(box, drive):
     duration = 1.4
-    signal = 0.01 * bump(np.linspace(0.0, duration, 501), duration)
+    times = np.linspace(0.0, duration, 501)
+    signal = 0.01 * bump(times, duration)
     oscillator = Oscillator.of(HEAVY, drive)
     sides = [np.linspace(low, high, 31) for low, high in box.ranges]
     factors = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 3)
@@ -245,7 +252,7 @@ def test_a_law_for_efforts_does_not_serve_a_servo(duration, predicted, left):
     assert residual.worst == pytest.approx(predicted, abs=2e-4)
     assert worst_of_corners(result, Drive.POSITION) == pytest.approx(left, rel=0.05)
     own, residual = planned(HEAVY, duration, Drive.POSITION)
-    assert worst_of_corners(own, Drive.POSITION) <= residual.worst * (1.0 + 1e-6) < 0.26 * left
+    assert worst_of_corners(own, Drive.POSITION) <= residual.worst * (1.0 + 1e-5) < 0.26 * left
 
 
 @pytest.mark.parametrize('periods', [0.7, 3.0, 30.0, 300.0])
@@ -268,9 +275,9 @@ def test_any_duration_under_a_servo(periods, nominal):
 def test_the_effort_of_a_servo_is_that_of_the_flat_map():
     result, _ = planned(HEAVY, 1.0, Drive.POSITION)
     samples = result.sample(5e-4)
-    effort = servo_effort(HEAVY, samples.driving_acceleration, 1.0)
+    effort = servo_effort(HEAVY, samples.driving_velocity, 1.0)
     size = np.abs(samples.driving_effort).max()
-    assert effort == pytest.approx(samples.driving_effort, abs=1e-4 * size)
+    assert effort == pytest.approx(samples.driving_effort, abs=2e-3 * size)
 
 
 def test_a_servo_on_three_joints():
@@ -289,7 +296,8 @@ def test_impulses_for_the_servo_s_resonance(shaper):
     exact, off = residual_amplitude(oscillator, signal, 1.5, poles)
     assert exact < 1e-6
     assert off > 50.0 * exact
-    other = shaped_quintic(HEAVY, 1.0, 1.5, shaper, times) / HEAVY.inertia_star.both
+    effort = shaped_quintic(HEAVY, 1.0, 1.5, shaper, times) / HEAVY.inertia_star.both
+    other = cumulative_simpson(effort, x=times, initial=0.0)
     assert residual_amplitude(oscillator, other, 1.5, poles)[0] > 1e-3
 
 

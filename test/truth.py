@@ -1,0 +1,170 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Random plans on random arms of a random box: what is predicted against what is simulated."""
+
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import Drive, FlatModel, PlanarArm
+from flat_planner_ros.core.insensitive import Insensitivity, UncertaintyBox
+from flat_planner_ros.core.insensitive.insensitivity import Criterion, Nominal
+from flat_planner_ros.core.insensitive.oscillator import Oscillator
+from flat_planner_ros.core.insensitive.residual import residual_amplitude
+from flat_planner_ros.core.motion_law import Strategy
+from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, residual_of_plan
+import numpy as np
+from scipy.linalg import expm
+
+PERIOD = 0.005
+"""Spacing of a command's points, or less: a hundredth of the motion [s]."""
+
+FINE = 8000
+"""Parts of a motion over which the velocity that a servo gives is joined linearly."""
+
+ACCURACY = (0.01, 1e-6)
+"""How far a prediction may be from the truth: relative, or [rad]."""
+
+STRATEGIES = (
+    Strategy.POLYNOMIAL,
+    Strategy.MIN_CONTROL_EFFORT,
+    Strategy.MIN_POTENTIAL_ENERGY,
+    Strategy.MIXED,
+    Strategy.INSENSITIVE,
+    Strategy.INSENSITIVE,
+)
+"""What is drawn from; half of the work is about the last."""
+
+
+class Truth(NamedTuple):
+    """Residuals of a case [rad]: on the true arm, predicted for it, and the worst of its box."""
+
+    simulated: float
+    predicted: float
+    worst: float
+    case: str
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the prediction is right, and the worst case no better than the truth."""
+        relative, absolute = ACCURACY
+        miss = abs(self.simulated - self.predicted)
+        is_right = miss <= max(relative * self.simulated, absolute)
+        return is_right and self.simulated <= self.worst * (1.0 + 1e-3) + absolute
+
+
+def truth(seed: int) -> Truth:
+    """Return the residuals of a random case."""
+    rng = np.random.default_rng([seed, 16])
+    arm, period = random_arm(rng)
+    drive = Drive(rng.choice([member.value for member in Drive]))
+    box = random_box(rng)
+    strategy = STRATEGIES[rng.integers(len(STRATEGIES))]
+    is_shaped = strategy is Strategy.INSENSITIVE
+    options = PlanningOptions(
+        strategy=strategy,
+        r=rng.uniform(50.0, 200.0),
+        p=rng.uniform(5.0, 30.0),
+        flat_model=FlatModel.EXACT if is_shaped else list(FlatModel)[rng.integers(2)],
+        insensitivity=Insensitivity(
+            box=box,
+            nominal=list(Nominal)[rng.integers(2)],
+            criterion=list(Criterion)[rng.integers(2)],
+            weight=10.0 ** rng.uniform(0.5, 3.0),
+        ),
+        drive=drive,
+    )
+    duration = period * 10.0 ** rng.uniform(-0.1, 1.0)
+    request = MotionRequest(
+        start=np.zeros(2), final=np.array([rng.uniform(0.3, 3.0), 0.0]), duration=duration
+    )
+    planned = plan(request, arm, options)
+    factors = np.array([rng.uniform(low, high) for low, high in box.ranges])
+    samples = planned.sample(min(PERIOD, duration / 100.0))
+    oscillator = Oscillator.of(arm, drive)
+    if drive is Drive.EFFORT:
+        signal = played = samples.driving_effort
+    else:
+        signal = planned.sample(duration / 1000.0).driving_velocity
+        played = planned.sample(duration / FINE).driving_velocity
+    poles = oscillator.poles(factors[None])
+    return Truth(
+        simulated=simulated(arm, drive, played, duration, factors),
+        predicted=float(residual_amplitude(oscillator, signal, duration, poles)[0]),
+        worst=residual_of_plan(planned, samples).worst,
+        case=f'{seed}: {strategy.value}, {drive.value}, {duration / period:.3g} periods, {box}',
+    )
+
+
+def random_arm(rng: np.random.Generator) -> tuple[PlanarArm, float]:
+    """Return an arm, and the period of its passive joint under an effort [s]."""
+    both = 10.0 ** rng.uniform(-4.0, 0.0)
+    last = both * rng.uniform(0.02, 0.7)
+    frequency = 2.0 * np.pi * 10.0 ** rng.uniform(np.log10(0.3), np.log10(20.0))
+    ratio = rng.choice([0.0, rng.uniform(0.0, 0.2)])
+    series = last * (both - last) / both
+    arm = PlanarArm.reduced(
+        inertia_star=(both, last),
+        stiffness=series * frequency**2,
+        damping=2.0 * ratio * series * frequency,
+    )
+    return arm, 2.0 * np.pi / frequency
+
+
+def random_box(rng: np.random.Generator) -> UncertaintyBox:
+    """Return what may differ; one time in two the last link's inertia is known."""
+    stiffness, damping = rng.uniform(0.0, 0.3), rng.uniform(0.0, 0.5)
+    if rng.integers(2):
+        return UncertaintyBox(stiffness=stiffness, damping=damping)
+    payload = (rng.uniform(-0.3, 0.0), rng.uniform(0.0, 1.0))
+    return UncertaintyBox(
+        stiffness=stiffness, damping=damping, inertia=rng.uniform(0.0, 0.2), payload=payload
+    )
+
+
+def simulated(
+    arm: PlanarArm, drive: Drive, signal: np.ndarray, duration: float, factors: np.ndarray
+) -> float:
+    """
+    Return the amplitude that the passive joint keeps, by exact steps of the arm's linear rows.
+
+    The states are the absolute angles of the last two links and their rates; the signal is linear
+    between its samples. The amplitude is that of the mode that the rows themselves have.
+    """
+    k, c = factors[0] * arm.stiffness, factors[1] * arm.damping
+    both, last = arm.inertia_star
+    free, last = both - last, factors[2] * last
+    rows = np.zeros((4, 4))
+    rows[:2, 2:] = np.eye(2)
+    rows[3] = np.array([k, -k, c, -c]) / last
+    push = np.array([0.0, 0.0, 1.0, 0.0])
+    if drive is Drive.EFFORT:
+        rows[2] = np.array([-k, k, -c, c]) / free
+        push /= free
+    step = duration / (len(signal) - 1)
+    slopes = np.diff(signal) / step
+    if drive is Drive.POSITION:
+        signal, slopes = slopes, np.zeros_like(slopes)
+    whole = np.zeros((6, 6))
+    whole[:4, :4] = rows
+    whole[:4, 4] = push
+    whole[4, 5] = 1.0
+    jump = expm(step * whole)
+    state = np.zeros(4)
+    for value, slope in zip(signal, slopes, strict=False):
+        state = jump[:4, :4] @ state + jump[:4, 4] * value + jump[:4, 5] * slope
+    # What is left swings as the passive joint does, link n-1 free or held.
+    looseness = 1.0 / last + (1.0 / free if drive is Drive.EFFORT else 0.0)
+    rates, modes = np.linalg.eig(np.array([[0.0, 1.0], [-k * looseness, -c * looseness]]))
+    shares = np.linalg.solve(modes, [state[1] - state[0], state[3] - state[2]])
+    return float(2.0 * abs(modes[0] * shares)[np.argmax(rates.imag)])
