@@ -42,9 +42,6 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-LIVE_VIEW = 'flat_live_view'
-"""Name of the node."""
-
 MEASURED, REFERENCE, RESIDUAL = 'measured', 'reference', 'residual'
 STREAMS = (MEASURED, REFERENCE, RESIDUAL)
 """Names of the streams; a row is the time, positions, velocities and efforts."""
@@ -102,7 +99,7 @@ class LiveNode(Node):
     """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(LIVE_VIEW, **options)
+        super().__init__(interfaces.LIVE_VIEW, **options)
         self.feed = Feed(STREAMS)
         self.feed.put('namespace', self.get_namespace())
         self.feed.put('choices', choices())

@@ -19,7 +19,7 @@ import sys
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.core.arm import FlatPlannerError, JointSample
+from flat_planner_ros.core.arm import Drive, FlatPlannerError, JointSample
 from flat_planner_ros.core.monitor import (
     MonitorSettings,
     PlannedMotion,
@@ -28,6 +28,7 @@ from flat_planner_ros.core.monitor import (
 )
 from flat_planner_ros.ros.nodes.early_loading import load_early, REPORTING
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
@@ -77,6 +78,7 @@ class MonitorNode(Node):
             DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE
         )
         plan = interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN)
+        self._plan_topic = self.resolve_topic_name(plan)
         # As bytes: the points of a long plan would take a second to become Python objects.
         self.create_subscription(
             JointTrajectory, plan, self._on_plan, interfaces.LATCHED, raw=True
@@ -97,6 +99,13 @@ class MonitorNode(Node):
         self.create_timer(TICK_PERIOD, self._on_tick, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._on_diagnostics, clock=steady)
         load_early(self, REPORTING)
+
+    @property
+    def introduction(self) -> str:
+        """Return what the node does, for its log."""
+        joints = self.get_parameter('joints').value
+        drive = Drive(self.get_parameter('drive').value)
+        return f'{arm_sentence(joints, drive)}; judges the motions on {self._plan_topic}'
 
     def _now(self) -> float:
         """Return the node's time [s]."""

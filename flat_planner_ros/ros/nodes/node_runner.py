@@ -27,6 +27,7 @@ from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.programs import SIGNALS
+from flat_planner_ros.ros.nodes.introduction import introduce
 import rclpy
 from rclpy.exceptions import NotInitializedException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
@@ -93,6 +94,7 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
                 nodes.append(create())
                 _pardon_shutdown(nodes[-1])
                 executor.add_node(nodes[-1])
+            introduce(nodes, sys.argv if args is None else args)
             for node in nodes:
                 node.get_logger().info('ready')
             is_ready = True

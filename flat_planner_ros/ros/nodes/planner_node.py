@@ -28,6 +28,7 @@ from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.introduction import planner_sentence
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
@@ -104,6 +105,11 @@ class PlannerNode(Node):
         """End the stream of efforts with zeros, then the node."""
         self._efforts.end()
         super().destroy_node()
+
+    @property
+    def introduction(self) -> str:
+        """Return what the node does, for its log."""
+        return planner_sentence(self, self._settings)
 
     @property
     def _settings(self) -> PlannerSettings:

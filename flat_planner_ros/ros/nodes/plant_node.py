@@ -21,6 +21,7 @@ from typing import Any
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidCommand
 from flat_planner_ros.core.plant import ArmState, PacedArm
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
@@ -70,6 +71,12 @@ class PlantNode(Node):
         self._on_tick()
 
     @property
+    def introduction(self) -> str:
+        """Return what the node does, for its log."""
+        arm = arm_sentence(self._settings.joints, self._settings.simulation.drive)
+        return f'{arm}; hears {self.resolve_topic_name(self._commands)}'
+
+    @property
     def _settings(self) -> PlantSettings:
         """Return the settings in force."""
         return self._configuration.settings
@@ -84,7 +91,7 @@ class PlantNode(Node):
             CommandInput.EFFORT: efforts,
             CommandInput.TRACKER: efforts,
         }[self._settings.command_input]
-        name = interfaces.topic_of(sender, topic)
+        self._commands = name = interfaces.topic_of(sender, topic)
         # As bytes: the points of a long command would take a second to become Python objects.
         raw = callback == self._on_trajectory
         self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)

@@ -27,6 +27,7 @@ from typing import Any, Generic, TypeVar
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.ros.parameters.arm_model import model_defaults
+from flat_planner_ros.ros.parameters.plausibility import doubts
 from flat_planner_ros.ros.parameters.row import InvalidParameter, Row, Values, wrong_type
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -78,6 +79,8 @@ class NodeParameters(Generic[Settings]):
         for row in rows:
             _declare(node, row, defaults.get(row.name, row.default))
         self.settings = self._checked({})
+        for doubt in doubts(self._values({})):
+            node.get_logger().warning(doubt)
         if defaults:
             node.get_logger().info("no model is given: this is the paper's arm")
         node.add_on_set_parameters_callback(self._validate)
@@ -85,6 +88,10 @@ class NodeParameters(Generic[Settings]):
 
     def _checked(self, changes: Values) -> Settings:
         """Return the settings of the present values with some changes."""
+        return self._build(self._values(changes))
+
+    def _values(self, changes: Values) -> Values:
+        """Return the present values with some changes, each within its range."""
         values = {}
         for name, row in self._rows.items():
             value = changes.get(name, self._node.get_parameter_or(name).value)
@@ -94,7 +101,7 @@ class NodeParameters(Generic[Settings]):
                 value = value.tolist()
             row.check(value)
             values[name] = value
-        return self._build(values)
+        return values
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
         """Answer a request to change parameters."""

@@ -27,6 +27,7 @@ from typing import Any
 
 from flat_planner_ros.ros.parameters.arm_model import model_defaults
 from flat_planner_ros.ros.parameters.node_parameters import refuse_unknown, Settings
+from flat_planner_ros.ros.parameters.plausibility import doubts
 from flat_planner_ros.ros.parameters.row import (
     InvalidParameter,
     Row,
@@ -77,7 +78,7 @@ def read_settings(
         Texts ``name:=value``; they win over the file, as `-p node:name:=value` does. (ROS takes
         `-p name:=value` for the block ``/**``, over which a node's own block wins.)
     warn
-        Is told of names that mean nothing to the node.
+        Is told of names that mean nothing to the node, and of a model that is hardly one.
 
     Raises
     ------
@@ -103,11 +104,41 @@ def read_settings(
         _check_type(row, value)
         row.check(value)
         values[row.name] = value
-    return build(values)
+    settings = build(values)
+    for doubt in doubts(values):
+        warn(doubt)
+    return settings
+
+
+def block_names(path: Path) -> list[str]:
+    """
+    Return for which nodes a file has blocks, as patterns such as ``/**/flat_planner``.
+
+    Raises
+    ------
+    InvalidParameter
+        The file cannot be read.
+
+    """
+    return [pattern for pattern, _ in _blocks(_content(path), path)]
+
+
+def reaches(pattern: str, node: str) -> bool:
+    """Return whether a block is for a node, whose name has its namespace."""
+    return re.fullmatch(_expression(pattern), node) is not None
 
 
 def _from_file(path: Path, node: str) -> dict[str, Any]:
     """Return all values in a file that are meant for a node, later blocks winning."""
+    values: dict[str, Any] = {}
+    for pattern, block in _blocks(_content(path), path):
+        if reaches(pattern, node):
+            values.update(_flat(block))
+    return values
+
+
+def _content(path: Path) -> Mapping[str, Any]:
+    """Return the tree of blocks in a file."""
     try:
         text = path.read_text('utf-8')
     except (OSError, UnicodeDecodeError) as error:
@@ -116,11 +147,7 @@ def _from_file(path: Path, node: str) -> dict[str, Any]:
     content = parsed(text, str(path))
     if not isinstance(content, Mapping):
         raise InvalidParameter(f'{path} is no parameter file: it has no block for any node')
-    values: dict[str, Any] = {}
-    for pattern, block in _blocks(content, path):
-        if re.fullmatch(_expression(pattern), node):
-            values.update(_flat(block))
-    return values
+    return content
 
 
 def parsed(text: str, source: str) -> Any:

@@ -31,9 +31,6 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-RECORDER = 'flat_recorder'
-"""Name of the node."""
-
 DEPTH = 1000
 """Messages of a topic that wait while the disk is slow."""
 
@@ -117,7 +114,7 @@ class RecorderNode(Node):
         overwrite: bool = False,
         **options: Any,
     ) -> None:
-        super().__init__(RECORDER, **options)
+        super().__init__(interfaces.RECORDER, **options)
         self._path = path
         self._everything = everything
         self.failure = ''

@@ -26,6 +26,8 @@ PLANNER = 'flat_planner'
 PLANT = 'flat_plant'
 MONITOR = 'flat_monitor'
 TRACKER = 'flat_tracker'
+LIVE_VIEW = 'flat_live_view'
+RECORDER = 'flat_recorder'
 
 JOINT_STATES = 'joint_states'
 CLOCK = '/clock'
