@@ -18,9 +18,10 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError, FloatArray
+from flat_planner_ros.core.arm import Drive, FlatPlannerError, FloatArray
 from flat_planner_ros.core.tracking import Tracker
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.tracker import build, ROWS
@@ -70,6 +71,14 @@ class TrackerNode(Node):
         self._look_period = settings.tracker.timeout / LOOKS
         self.create_timer(self._look_period, self._on_look, clock=self._steady)
         self.get_logger().info(f'certified: {self._tracker.certificate.sentence}')
+
+    @property
+    def introduction(self) -> str:
+        """Return what the node does, for its log."""
+        command = self.resolve_topic_name(
+            interfaces.topic_of(interfaces.PLANNER, interfaces.COMMAND)
+        )
+        return f'{arm_sentence(self._joints, Drive.EFFORT)}; tracks the command on {command}'
 
     def _now(self) -> float:
         """Return the node's time [s]."""
