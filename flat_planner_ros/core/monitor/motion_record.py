@@ -192,6 +192,40 @@ class Record:
         return inside[:, 0], inside[:, 1:]
 
 
+class Measured:
+    """
+    What is kept of the samples of a motion.
+
+    A long motion thins out its own record, not that of what it leaves.
+
+    Parameters
+    ----------
+    width
+        Number of joints [-].
+
+    Attributes
+    ----------
+    efforts
+        Of the time of the motion [N m].
+
+    """
+
+    def __init__(self, width: int) -> None:
+        self.efforts = Record(width)
+        self._during = Record(width)
+        self._after = Record(width)
+
+    def add(self, time: float, positions: FloatArray, *, is_after: bool) -> None:
+        """Keep positions [rad] during or after the motion, times ascending."""
+        record = self._after if is_after else self._during
+        record.append(time, positions)
+
+    def positions(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """Return times [s], shape (m,), and positions [rad], shape (m, n), in between."""
+        parts = [record.between(start, end) for record in (self._during, self._after)]
+        return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+
+
 def joint_indices(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.intp]:
     """
     Return where each wanted joint stands among the names.

@@ -18,8 +18,10 @@ from dataclasses import dataclass
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.monitor.arrival import judge_arrival
+from flat_planner_ros.core.monitor.course import compare, Course
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
-from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record
+from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 import numpy as np
@@ -39,7 +41,7 @@ class VibrationReport:
     Attributes
     ----------
     level
-        Verdict on the amplitude; at least ``WARN`` if there is none.
+        Verdict on the amplitude, at least ``WARN`` if there is none, and on the arrival.
     message
         The verdict in one sentence, with the reasons for what is missing.
     start_time, end_time
@@ -67,6 +69,8 @@ class VibrationReport:
         Number of samples in the window [-].
     estimate
         Stiffness and damping of the passive joint, ``None`` without a model to compare with.
+    course
+        How the motion was carried out, ``None`` if too little of it was seen.
 
     """
 
@@ -85,6 +89,7 @@ class VibrationReport:
     window: float
     samples: int
     estimate: StiffnessEstimate | None = None
+    course: Course | None = None
 
     @property
     def is_settled(self) -> bool:
@@ -92,11 +97,14 @@ class VibrationReport:
         return self.settling_time is not None
 
 
+WHOLE_PERIOD = 0.98
+"""Part of a period that counts as one [-]."""
+
+
 def assess(
     motion: PlannedMotion,
     settings: MonitorSettings,
-    positions: Record,
-    efforts: Record,
+    measured: Measured,
     until: float,
     cause: str = '',
     *,
@@ -111,8 +119,8 @@ def assess(
         The motion.
     settings
         Window, tolerances and expectations.
-    positions, efforts
-        Measured joint positions after [rad] and joint efforts during the motion [N m].
+    measured
+        What was measured from the start of the motion on.
     until
         Time at which the window is cut at the latest [s].
     cause
@@ -126,18 +134,28 @@ def assess(
         The verdict.
 
     """
-    times, rows = positions.between(motion.end, min(until, motion.end + settings.window))
+    until = min(until, motion.end + settings.window)
+    course = compare(motion, *measured.positions(motion.start, until))
+    # All that follows is about the time at which the arm did it, not about what was planned.
+    done = motion if course is None or not course.remark else course.carried_out(motion)
+    times, rows = measured.positions(done.end, until)
     errors = rows - motion.final
-    fit = fit_oscillation(times, errors[:, -1], motion.end)
-    estimate = _estimate(times - motion.end, errors, fit, settings)
+    fit = fit_oscillation(times, errors[:, -1], done.end)
+    if course is not None and course.is_in_degrees:
+        fit = OscillationFit(samples=times.size, reason='the unit of the joint states is doubtful')
+    estimate = _estimate(times - done.end, errors, fit, settings)
     frequency = fit.frequency or settings.expected_frequency
-    settling = _settling_time(times - motion.end, errors[:, -1], settings.settling_band, frequency)
-    start = times[-1] - 1.0 / frequency if frequency and times.size else motion.end
+    settling = _settling_time(times - done.end, errors[:, -1], settings.settling_band, frequency)
+    window = float(times[-1]) - done.end if times.size else 0.0
+    period = 1.0 / frequency if frequency else window
+    final_error = _time_mean(times, errors, done.end + window - period)
+    missed = _missed(final_error, fit, is_whole=window >= WHOLE_PERIOD * period)
+    arrival = judge_arrival(motion, missed, course, settings)
     rms = tuple(
-        _rms_effort(*efforts.between(motion.start, motion.end), joint, motion)
+        _rms_effort(*measured.efforts.between(done.start, done.end), joint, done)
         for joint in range(len(motion.joint_names))
     )
-    late = float(times[0]) - motion.end if times.size else 0.0
+    late = float(times[0]) - done.end if times.size else 0.0
     # Nothing seen is said once, not once for every number that is missing.
     remarks: tuple[str, ...] = (cause or fit.reason,)
     if times.size:
@@ -151,9 +169,10 @@ def assess(
             _effort_remark(motion.joint_names, rms),
             _estimate_remark(estimate, fit),
         )
+    sentence = (arrival.remark, _verdict(fit, settings), *remarks)
     return VibrationReport(
-        level=Level.STALE if stale else _level(fit, settings),
-        message='; '.join((_verdict(fit, settings), *filter(None, remarks))),
+        level=Level.STALE if stale else Level.worst((arrival.level, _level(fit, settings))),
+        message='; '.join(filter(None, sentence)),
         start_time=motion.start,
         end_time=motion.end,
         joint=motion.joint_names[-1],
@@ -162,11 +181,12 @@ def assess(
         damping_expected=settings.expected_damping_ratio,
         settling_time=settling,
         joint_names=motion.joint_names,
-        final_error=_time_mean(times, errors, start),
+        final_error=final_error,
         rms_effort=rms,
-        window=float(times[-1]) - motion.end if times.size else 0.0,
+        window=window,
         samples=times.size,
         estimate=estimate,
+        course=course,
     )
 
 
@@ -180,6 +200,15 @@ def _estimate(
     if joints != arm.n:
         return StiffnessEstimate(reason=f'the plan has {joints} joints, the model {arm.n}')
     return identify(elapsed, errors, fit, arm, settings.actuated_joints)
+
+
+def _missed(
+    final_error: tuple[float, ...], fit: OscillationFit, *, is_whole: bool
+) -> tuple[float, ...]:
+    """Return how far the joints are off their goals [rad], of the passive one its middle."""
+    # It decays while it swings, so that its mean is not zero; less than a period says nothing.
+    middle = (fit.bias,) if is_whole and fit.bias is not None else ()
+    return final_error[:-1] + middle
 
 
 def _settling_time(

@@ -14,6 +14,7 @@
 
 """What a monitor looks at, what it tolerates, and how severe its reports can be."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -25,6 +26,17 @@ from flat_planner_ros.core.arm import (
 )
 from flat_planner_ros.core.monitor.identification import ActuatedJoints
 
+UNITS = {
+    'window': 's',
+    'amplitude_ok': 'rad',
+    'amplitude_error': 'rad',
+    'final_ok': 'rad',
+    'final_error': 'rad',
+    'settling_band': 'rad',
+    'timeout': 's',
+}
+"""Settings above 0, with their units."""
+
 
 class Level(Enum):
     """Severity of a report."""
@@ -33,6 +45,12 @@ class Level(Enum):
     WARN = 'warn'
     ERROR = 'error'
     STALE = 'stale'
+
+    @staticmethod
+    def worst(levels: Iterable['Level']) -> 'Level':
+        """Return the most severe level, OK if there is none."""
+        order = list(Level)
+        return max(levels, key=order.index, default=Level.OK)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +64,9 @@ class MonitorSettings:
         Time after the motion that is judged [s]; several periods.
     amplitude_ok, amplitude_error
         Largest amplitude that is fine, and largest that is no error [rad].
+    final_ok, final_error
+        Largest deviation of a joint from its goal after the motion that is fine, and largest that
+        is no error [rad].
     settling_band
         Deviation from the final position that counts as settled [rad].
     timeout
@@ -67,6 +88,8 @@ class MonitorSettings:
     window: float = 3.0
     amplitude_ok: float = 5e-3
     amplitude_error: float = 5e-2
+    final_ok: float = 1e-2
+    final_error: float = 0.1
     settling_band: float = 5e-3
     timeout: float = 0.5
     joint_states: JointStateRules = JointStateRules()  # noqa: RUF009  A frozen value.
@@ -77,14 +100,13 @@ class MonitorSettings:
 
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""
-        units = {'window': 's', 'amplitude_ok': 'rad', 'settling_band': 'rad', 'timeout': 's'}
-        for name, unit in units.items():
+        for name, unit in UNITS.items():
             check_number(name, getattr(self, name), unit, above=0.0, error=InvalidRequest)
-        if not self.amplitude_error >= self.amplitude_ok:
-            raise InvalidRequest(
-                f'amplitude_error {self.amplitude_error} rad is below amplitude_ok '
-                f'{self.amplitude_ok} rad'
-            )
+        for least, most in (('amplitude_ok', 'amplitude_error'), ('final_ok', 'final_error')):
+            if not getattr(self, most) >= getattr(self, least):
+                raise InvalidRequest(
+                    f'{most} {getattr(self, most)} rad is below {least} {getattr(self, least)} rad'
+                )
         frequency, ratio = self.expected_frequency, self.expected_damping_ratio
         if frequency is not None:
             check_number('expected_frequency', frequency, 'Hz', above=0.0, error=InvalidRequest)

@@ -18,7 +18,8 @@ from enum import Enum
 from math import inf, isfinite, nan
 
 from flat_planner_ros.core.arm import InvalidRequest, JointSample, JUMP, travel
-from flat_planner_ros.core.monitor.motion_record import PlannedMotion, Record, Residual
+from flat_planner_ros.core.monitor.course import DEGREES
+from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.report import assess, VibrationReport
 from flat_planner_ros.core.monitor.settings import MonitorSettings
 import numpy as np
@@ -73,8 +74,7 @@ class VibrationMonitor:
         self._dropped_told = 0
         self._set_back = 0.0
         self._reports: list[VibrationReport] = []
-        self._positions = Record(0)
-        self._efforts = Record(0)
+        self._measured = Measured(0)
 
     @property
     def phase(self) -> Phase:
@@ -172,9 +172,8 @@ class VibrationMonitor:
                 self._close(time, jump)
                 return self._take_reports()
         if time <= motion.end:
-            self._efforts.append(time, nan if sample.efforts is None else sample.efforts)
-        if time >= motion.end:
-            self._positions.append(time, positions)
+            self._measured.efforts.append(time, nan if sample.efforts is None else sample.efforts)
+        self._measured.add(time, positions, is_after=time >= motion.end)
         if time >= motion.end + self.settings.window:
             self._close(time)
         return self._take_reports()
@@ -265,10 +264,11 @@ class VibrationMonitor:
                 is_cut = motion.start < former.end + self.settings.window
                 cause = 'window cut short by the next motion' if is_cut else ''
                 self._close(motion.start, cause)
+        efforts = self._measured.efforts
+        self._measured = Measured(len(motion.joint_names))
         # A motion spliced into a running one starts with what that one has measured.
-        if not (is_spliced and former and former.joint_names == motion.joint_names):
-            self._efforts = Record(len(motion.joint_names))
-        self._positions = Record(len(motion.joint_names))
+        if is_spliced and former and former.joint_names == motion.joint_names:
+            self._measured.efforts = efforts
         self._motion = motion
         self._pending = None
         self._heard = now
@@ -282,8 +282,7 @@ class VibrationMonitor:
         """End the watch of the present motion and judge it on the samples before `until`."""
         self._phase = Phase.DONE
         if self._motion is not None:
-            measured = self._positions, self._efforts
-            report = assess(self._motion, self.settings, *measured, until, cause, stale=stale)
+            report = assess(self._motion, self.settings, self._measured, until, cause, stale=stale)
             self._reports.append(report)
 
 
@@ -304,7 +303,9 @@ def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> st
         return ''
     planned = motion.reference(sample.time)[0] - motion.reference(former.time)[0]
     elapsed = sample.time - former.time
-    excess = np.minimum(np.abs(change), np.abs(change - planned)) - travel(former, sample)
+    # A joint may stand still, follow the plan, or do so in degrees, which the report will say.
+    least = np.min([np.abs(change - factor * planned) for factor in (0.0, 1.0, DEGREES)], axis=0)
+    excess = least - travel(former, sample)
     joint = int(np.argmax(excess))
     if excess[joint] <= JUMP:
         return ''

@@ -283,6 +283,7 @@ def _report_values(report: VibrationReport) -> Values:
         'settled': report.is_settled if seen else None,
         'bias': report.fit.bias,
         **_joint_values('final_error', report.joint_names, report.final_error),
+        'travel_ratio': None if report.course is None else report.course.ratio,
         **_joint_values('rms_effort', report.joint_names, report.rms_effort),
         'window': report.window if seen else None,
         'samples': report.samples,

@@ -179,6 +179,7 @@ def test_a_motion_yields_one_report_with_what_was_simulated(bench):
         'damping_ratio': pytest.approx(DECAY / hypot(DECAY, omega), rel=1e-5),
         'damping_expected': pytest.approx(0.0326, abs=1e-4),
         'rms_effort.joint1': pytest.approx(sqrt(0.5), rel=1e-2),
+        'travel_ratio': 1.0,
         'window': pytest.approx(WINDOW),
         'samples': WINDOW * RATE + 1,
         # (42) solved for stiffness and damping.
