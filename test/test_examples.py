@@ -94,6 +94,15 @@ def on_a_controller(ran):
     assert ran['points'][-1]['positions'] == [0.2, 0.0]
 
 
+def servo(ran):
+    inside = np.abs(ran['factors'] - 1.0) < 0.101
+    right, wrong, own = (left[inside].max() for left in ran['found'].values())
+    assert right < 1e-3
+    assert wrong > 20.0 * right
+    assert own < wrong / 4.0
+    assert own < 1.02 * max(ran['worst'].values())
+
+
 CLAIMS = [
     first_motion,
     strategies,
@@ -105,6 +114,7 @@ CLAIMS = [
     own_cost,
     own_arm,
     on_a_controller,
+    servo,
 ]
 
 
@@ -135,7 +145,7 @@ def test_an_example_is_one_page_and_shown(path):
 
 
 def test_examples_are_numbered_and_use_the_public_list():
-    assert [path.name[:2] for path in EXAMPLES] == [f'{i:02}' for i in range(1, 11)]
+    assert [path.name[:2] for path in EXAMPLES] == [f'{i:02}' for i in range(1, 12)]
     for path in EXAMPLES:
         private = re.findall(r'flat_planner_ros\.core\.\w+', path.read_text('utf-8'))
         assert not private

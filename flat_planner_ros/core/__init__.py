@@ -16,6 +16,7 @@
 
 from flat_planner_ros.core.arm import (
     counterbalances,
+    Drive,
     FlatModel,
     FlatPlannerError,
     NotFlat,
@@ -24,7 +25,7 @@ from flat_planner_ros.core.arm import (
 )
 from flat_planner_ros.core.insensitive import Insensitivity, predict_residual, UncertaintyBox
 from flat_planner_ros.core.monitor import fit_oscillation, identify
-from flat_planner_ros.core.motion_law import QuadraticCost, Strategy
+from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.core.planning import (
     JointLimits,
     MotionRequest,
@@ -47,6 +48,7 @@ from flat_planner_ros.core.session import (
 
 __all__ = [
     'counterbalances',
+    'Drive',
     'EffortProfile',
     'fit_oscillation',
     'FlatModel',
@@ -65,7 +67,6 @@ __all__ = [
     'PlanningOptions',
     'predict_residual',
     'residual_of_plan',
-    'QuadraticCost',
     'suggest_counterbalances',
     'rollout',
     'SessionSettings',
