@@ -175,7 +175,7 @@ class PlanningOptions:
 
 
 class Reason(Enum):
-    """Why a request is rejected; the names are those of the ROS interface."""
+    """Why a request is rejected or fails; the names are those of the ROS interface."""
 
     INVALID_GOAL = 'INVALID_GOAL'
     INVALID_JOINTS = 'INVALID_JOINTS'
@@ -198,6 +198,8 @@ class Reason(Enum):
     SOLVER_FAILED = 'SOLVER_FAILED'
     ILL_CONDITIONED = 'ILL_CONDITIONED'
     BUSY = 'BUSY'
+    PATH_TOLERANCE_VIOLATED = 'PATH_TOLERANCE_VIOLATED'
+    GOAL_TOLERANCE_VIOLATED = 'GOAL_TOLERANCE_VIOLATED'
     INTERNAL = 'INTERNAL'
 
 

@@ -14,12 +14,14 @@
 
 """Session: goals and measurements in, motions and verdicts out, in the order of time."""
 
+from flat_planner_ros.core.session.execution import Astray, Ended, Outcome, Shortfall
 from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint
-from flat_planner_ros.core.session.session import Ended, Outcome, PlannerSession
+from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 
 __all__ = [
+    'Astray',
     'check_point_count',
     'Ended',
     'Goal',
@@ -28,6 +30,7 @@ __all__ = [
     'Outcome',
     'PlannerSession',
     'SessionSettings',
+    'Shortfall',
     'StartSource',
     'Timeline',
     'Track',

@@ -159,55 +159,6 @@ def _splice(timeline: Timeline, stamp: float | None, soonest: float) -> MotionSt
     return MotionStart(time, samples.positions[0], samples.planned[:, :CONDITIONS, 0], running)
 
 
-def check_carried_out(
-    settings: SessionSettings, timeline: Timeline, measured: JointSample | None, now: float
-) -> None:
-    """
-    Refuse a splice while the arm is far from what it is planned to do.
-
-    Its executor has then lost the motion, restarted perhaps, and would refuse what continues it.
-    Without a fresh measured state there is nothing to compare.
-
-    Parameters
-    ----------
-    settings
-        With the tolerance.
-    timeline
-        What is planned.
-    measured
-        Last measured state, None before the first.
-    now
-        Present time [s].
-
-    Raises
-    ------
-    RequestRejected
-        An actuated joint is beyond the tolerance.
-
-    """
-    limit = settings.replan_tolerance
-    if limit == 0.0 or measured is None:
-        return
-    motion = timeline.at(measured.time)
-    is_fresh = abs(now - measured.time) <= settings.joint_state_timeout
-    # What was planned before the first motion left is not known any more.
-    if not is_fresh or motion is None or measured.time < motion.start:
-        return
-    planned = motion.reference(measured.time).positions[0]
-    actuated = zip(settings.joints[:-1], measured.positions, planned, strict=False)
-    for name, position, reference in actuated:
-        if abs(position - reference) > limit:
-            raise RequestRejected(
-                Reason.START_STATE_MISMATCH,
-                f'{name} is measured at {position:.4g} rad, but motion {motion.plan_id} is then '
-                f'at {reference:.4g} rad (replan.tolerance {limit:g} rad): the arm does not carry '
-                f'it out, call ~/stop or wait for its end at {motion.end:.3f} s',
-                joint=name,
-                value=float(position),
-                limit=limit,
-            )
-
-
 def check_stamp(stamp: float | None, now: float) -> None:
     """Refuse a start in the past [s]."""
     if stamp is not None and stamp < now:

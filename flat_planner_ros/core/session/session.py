@@ -16,8 +16,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from enum import Enum
-from typing import NamedTuple
+from math import inf
 
 from flat_planner_ros.core.arm import (
     InvalidRequest,
@@ -37,9 +36,15 @@ from flat_planner_ros.core.planning import (
     ViaPoint,
     with_via_times,
 )
+from flat_planner_ros.core.session.execution import (
+    Astray,
+    check_carried_out,
+    Ended,
+    ExecutionWatch,
+    Outcome,
+)
 from flat_planner_ros.core.session.goal import checked_goal, Goal
 from flat_planner_ros.core.session.motion_start import (
-    check_carried_out,
     check_stamp,
     motion_start,
     MotionStart,
@@ -55,26 +60,6 @@ DELIVERY_SHARE = 0.25
 
 NOMINAL_DURATION = 1.0
 """Duration of a request before its own is found [s]."""
-
-
-class Outcome(Enum):
-    """How an accepted goal ended."""
-
-    FINISHED = 'FINISHED'
-    """At its final pose."""
-
-    STOPPED = 'STOPPED'
-    """At rest on the way."""
-
-    PREEMPTED = 'PREEMPTED'
-    """Replaced by another goal."""
-
-
-class Ended(NamedTuple):
-    """A motion that has ended, and how."""
-
-    motion: Motion
-    outcome: Outcome
 
 
 class PlannerSession:
@@ -102,6 +87,7 @@ class PlannerSession:
         self._timeline = Timeline()
         self._motion: Motion | None = None
         self._ended: list[Ended] = []
+        self._watch = ExecutionWatch()
         self._count = 0
         self._last_goal: Goal | None = None
 
@@ -136,6 +122,7 @@ class PlannerSession:
         # Far back is no late message, but a clock that was set back.
         if not 0.0 < age <= self.settings.joint_state_timeout:
             self._measured = sample
+            self._watch.follow(self.settings, self._timeline, sample)
 
     def knows_start(self, now: float) -> bool:
         """Tell whether goals can be judged: there is a time [s], and a state where one counts."""
@@ -240,16 +227,21 @@ class PlannerSession:
         return self._accepted(motion, start, None, clock)
 
     def take_ended(self, now: float) -> list[Ended]:
-        """Return, once, the motions that have come to an end or been replaced."""
-        ended = [
-            Ended(motion, Outcome.STOPPED if motion.is_stop else Outcome.FINISHED)
-            for motion in self._timeline.motions
-            if motion.cut is None and motion.end <= now
-        ]
+        """
+        Return, once, the motions that have come to an end or been replaced.
+
+        The end is said when the arm is seen there at rest, else when the patience is over; at once
+        where it cannot be seen.
+        """
+        self._end_motions(now)
+        ended = self._watch.take_arrived(self.settings, self._timeline, self._measured, now)
         ended += self._ended
         self._ended = []
-        self._timeline = self._timeline.after(now)
         return ended
+
+    def take_astray(self) -> list[Astray]:
+        """Return, once, the motions under way that the arm has left."""
+        return self._watch.take_astray()
 
     def track(self, now: float) -> Track:
         """Return all that is still to be carried out, as an executor is to be sent it."""
@@ -284,6 +276,11 @@ class PlannerSession:
                 value=now - motion.planned_at,
                 limit=(1.0 - DELIVERY_SHARE) * settings.lookahead,
             )
+        if start.running is None:
+            # From its next start on, nobody can tell any more where the arm has come to.
+            self._end_motions(now)
+            measured = self._measured
+            self._ended += self._watch.take_arrived(settings, self._timeline, measured, inf)
         if settings.execute:
             for old in self._timeline.replaced(motion.start):
                 if not (motion.is_stop and old.plan_id == motion.plan_id):
@@ -293,6 +290,13 @@ class PlannerSession:
             self._count = motion.plan_id
         self._motion = motion
         return motion
+
+    def _end_motions(self, now: float) -> None:
+        """Take the motions whose time is over off the timeline."""
+        for motion in self._timeline.motions:
+            if motion.cut is None and motion.end <= now:
+                self._watch.expect(motion)
+        self._timeline = self._timeline.after(now)
 
     def _start(self, stamp: float | None, now: float) -> MotionStart:
         """Return where a motion starts."""

@@ -85,6 +85,11 @@ class SessionSettings:
     replan_tolerance
         Largest distance of a measured actuated joint from what was planned for that time at which
         another motion may take over [rad]; 0 for any.
+    finish_tolerance
+        Distance of every actuated joint from the end of a motion within which it is there [rad];
+        0 for any: ends are said by the plan alone.
+    finish_patience
+        Time that the arm may take to be there at rest [s].
     is_stamped
         Whether the executor plays a command at its stamp; if it plays on arrival, no motion can
         take over from another.
@@ -111,6 +116,8 @@ class SessionSettings:
     start_delay: float = 0.05
     lookahead: float = 0.1
     replan_tolerance: float = 0.5
+    finish_tolerance: float = 0.1
+    finish_patience: float = 1.0
     is_stamped: bool = True
     execute: bool = True
 

@@ -29,6 +29,19 @@ EXCUSED_LOOKS = 5
 REMARK = 'a killed node stays listed for up to 20 s'
 """Time for which DDS takes a silent participant for alive."""
 
+RECORDERS = ('flat_recorder', 'rosbag2_recorder')
+"""Nodes that listen to commands and carry none out."""
+
+
+def unheard(node: Node, *topics: str) -> str:
+    """Return that nobody carries out what is published on topics, a clause; empty if one does."""
+    names = [node.resolve_topic_name(topic) for topic in topics]
+    for name in names:
+        infos = node.get_subscriptions_info_by_topic(name)
+        if any(info.node_name not in RECORDERS for info in infos):
+            return ''
+    return f'nobody listens to {" or ".join(names)}'
+
 
 class GraphWatch:
     """

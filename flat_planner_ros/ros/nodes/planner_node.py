@@ -27,7 +27,7 @@ from flat_planner_ros.core.session import Goal, PlannerSession
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
-from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.graph_watch import GraphWatch, unheard
 from flat_planner_ros.ros.nodes.introduction import planner_sentence
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
@@ -190,8 +190,19 @@ class PlannerNode(Node):
 
     def _report_ended(self) -> None:
         """Publish how motions have ended."""
+        for astray in self._session.take_astray():
+            self._publish_status(diagnostics.astray_status(astray))
         for ended in self._session.take_ended(self._now()):
-            self._publish_status(diagnostics.ended_status(ended))
+            remark = '' if ended.shortfall is None else self._doubt()
+            self._publish_status(diagnostics.ended_status(ended, remark))
+
+    def _doubt(self) -> str:
+        """Return that nobody hears the commands, a clause; empty if somebody does."""
+        settings = self._settings
+        if not settings.session.execute:
+            return ''
+        streams = [interfaces.EFFORT_COMMANDS] if settings.stream_effort else []
+        return unheard(self, interfaces.COMMAND, *streams)
 
     def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
         """Give a goal exactly one verdict; carry it out if it is accepted."""
@@ -217,6 +228,7 @@ class PlannerNode(Node):
                 elapsed,
                 with_advice=self._settings.report_advice,
                 with_baselines=self._settings.report_baselines,
+                doubt=self._doubt(),
             )
         self._publish_status(status)
         self._report_ended()

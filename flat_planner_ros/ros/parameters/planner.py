@@ -235,6 +235,22 @@ ROWS = [
         lower=0.0,
     ),
     Row(
+        'finish.position_tolerance',
+        SessionSettings.finish_tolerance,
+        'rad',
+        'distance of every actuated joint from the end of a motion within which it is there',
+        '0 = any, the plan alone tells',
+        lower=0.0,
+    ),
+    Row(
+        'finish.patience',
+        SessionSettings.finish_patience,
+        's',
+        'time after the end of a motion in which the arm must be there at rest',
+        lower=0.0,
+        upper=60.0,
+    ),
+    Row(
         'execute', SessionSettings.execute, '', 'publish commands', 'false = plan and report only'
     ),
     Row('command.include_passive_joint', True, '', 'name the passive joint in the command'),
@@ -321,6 +337,8 @@ def build(values: Values) -> PlannerSettings:
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
         replan_tolerance=values['replan.tolerance'],
+        finish_tolerance=values['finish.position_tolerance'],
+        finish_patience=values['finish.patience'],
         is_stamped=CommandStamp(values['command.stamp']) is CommandStamp.ABSOLUTE,
         execute=values['execute'],
     )

@@ -32,7 +32,7 @@ from flat_planner_ros.core.planning import (
     RequestRejected,
     residual_of_plan,
 )
-from flat_planner_ros.core.session import Ended, Goal, Motion, Outcome
+from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, Shortfall
 from flat_planner_ros.ros.wire.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
 from flat_planner_ros.ros.wire.stamps import time_msg
 
@@ -54,6 +54,7 @@ ENDINGS = {
     Outcome.FINISHED: 'has come to its end',
     Outcome.STOPPED: 'has been brought to rest on the way',
     Outcome.PREEMPTED: 'is replaced by a later goal',
+    Outcome.FAILED: 'was not carried out',
 }
 """Half a sentence on each end of a motion."""
 
@@ -90,6 +91,7 @@ def accepted_status(
     *,
     with_advice: bool = True,
     with_baselines: bool = False,
+    doubt: str = '',
 ) -> DiagnosticStatus:
     """
     Return the verdict on a goal that became a motion.
@@ -104,6 +106,8 @@ def accepted_status(
         Time that planning took [s].
     with_advice, with_baselines
         Whether to say when more time pays, and what simpler methods would leave behind.
+    doubt
+        Why it may not be carried out, a clause; empty for no reason.
 
     """
     plan = motion.plan
@@ -126,6 +130,9 @@ def accepted_status(
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
         values.update(_joint_values(quantity, joints, getattr(plan, quantity).tolist()))
     level = DiagnosticStatus.OK
+    if doubt:
+        level = DiagnosticStatus.WARN
+        message += f'; {doubt}'
     if motion.replaced_strategy is not None:
         level = DiagnosticStatus.WARN
         message += f'; not {motion.replaced_strategy.value}, which only plans from rest'
@@ -154,12 +161,25 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
     return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
 
 
-def ended_status(ended: Ended) -> DiagnosticStatus:
-    """Return the notice that a motion has ended, and how."""
-    motion, outcome = ended
+def ended_status(ended: Ended, remark: str = '') -> DiagnosticStatus:
+    """Return the notice that a motion has ended, and how; a remark is for those that failed."""
+    motion, outcome, shortfall, said = ended
     message = f'plan {motion.plan_id} {ENDINGS[outcome]}'
     values = _motion_values(motion, outcome.value)
-    return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
+    if shortfall is None:
+        message = '; '.join(filter(None, (message, said)))
+        return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
+    message = '; '.join(filter(None, (f'{message}: {shortfall.message}', said, remark)))
+    values = {**values, **_shortfall_values(shortfall)}
+    return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, message, values)
+
+
+def astray_status(astray: Astray) -> DiagnosticStatus:
+    """Return the notice that the arm has left the motion under way."""
+    motion, shortfall = astray
+    values = {**_motion_values(motion, 'ASTRAY'), **_shortfall_values(shortfall)}
+    message = f'plan {motion.plan_id} is not followed: {shortfall.message}'
+    return status_msg(STATUS_NAME, DiagnosticStatus.WARN, message, values)
 
 
 def adopted_status(adoption: Adoption) -> DiagnosticStatus:
@@ -303,6 +323,17 @@ def _estimate_values(estimate: StiffnessEstimate | None) -> Values:
         'damping_std': estimate.damping_std,
         'estimate_basis': estimate.case.value,
         'estimate_inertia': estimate.inertia,
+    }
+
+
+def _shortfall_values(shortfall: Shortfall) -> Values:
+    """Return what an arm does instead of what is planned."""
+    return {
+        'error_code': ERROR_CODES[shortfall.reason],
+        'error_name': shortfall.reason.value,
+        'joint': shortfall.joint,
+        'value': shortfall.value,
+        'limit': shortfall.limit,
     }
 
 

@@ -88,6 +88,8 @@ ERROR_CODES = {
     Reason.INVALID_GOAL: -1,
     Reason.INVALID_JOINTS: -2,
     Reason.OLD_HEADER_TIMESTAMP: -3,
+    Reason.PATH_TOLERANCE_VIOLATED: -4,
+    Reason.GOAL_TOLERANCE_VIOLATED: -5,
     Reason.EMPTY_GOAL: -101,
     Reason.NON_FINITE: -102,
     Reason.SIZE_MISMATCH: -103,
@@ -108,7 +110,7 @@ ERROR_CODES = {
     Reason.BUSY: -140,
     Reason.INTERNAL: -199,
 }
-"""Codes in `~/status`; -1 to -3 as in control_msgs/FollowJointTrajectory."""
+"""Codes in `~/status`; -1 to -5 as in control_msgs/FollowJointTrajectory."""
 
 
 def topic_of(node: str, topic: str) -> str:

@@ -28,8 +28,9 @@ from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import PlanningOptions, Reason, RequestRejected
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import SimulatedArm
+from flat_planner_ros.core.session.execution import Outcome
 from flat_planner_ros.core.session.goal import Goal, GoalPoint
-from flat_planner_ros.core.session.session import Outcome, PlannerSession
+from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 import numpy as np
 import pytest
@@ -54,6 +55,11 @@ def session(**changes: object) -> PlannerSession:
     result = PlannerSession(replace(SETTINGS, **changes))
     result.measure(sample())
     return result
+
+
+def ended(planner, now):
+    """Return the motions that have ended, and how."""
+    return [(end.motion, end.outcome) for end in planner.take_ended(now)]
 
 
 def reason_of(call, *args: object) -> RequestRejected:
@@ -215,9 +221,9 @@ def test_a_duration_outside_the_range_is_refused(time, limit):
 def test_a_motion_ends_once():
     planner = session()
     motion = planner.submit(GOAL, NOW)
-    assert planner.take_ended(motion.end - 0.01) == []
-    assert planner.take_ended(motion.end) == [(motion, Outcome.FINISHED)]
-    assert planner.take_ended(motion.end + 1.0) == []
+    assert ended(planner, motion.end - 0.01) == []
+    assert ended(planner, motion.end) == [(motion, Outcome.FINISHED)]
+    assert ended(planner, motion.end + 1.0) == []
 
 
 def test_a_goal_in_motion_takes_over_without_a_step():
@@ -233,8 +239,8 @@ def test_a_goal_in_motion_takes_over_without_a_step():
         scale = np.abs(getattr(first.samples, quantity)).max()
         assert after == pytest.approx(before, abs=1e-9 * scale)
     assert second.samples.positions[-1].tolist() == [0.0, 0.0]
-    assert planner.take_ended(now) == [(first, Outcome.PREEMPTED)]
-    assert planner.take_ended(second.end) == [(second, Outcome.FINISHED)]
+    assert ended(planner, now) == [(first, Outcome.PREEMPTED)]
+    assert ended(planner, second.end) == [(second, Outcome.FINISHED)]
 
 
 def test_no_motion_takes_over_from_one_that_the_arm_does_not_carry_out():
@@ -338,8 +344,8 @@ def test_goals_queue_by_their_stamps():
     assert track.start + track.times[-1] == pytest.approx(third.end)
     assert (np.diff(track.times) > 0.0).all()
     assert planner.reference(first.end + 0.25).positions[0].tolist() == [pi, 0.0]
-    assert planner.take_ended(first.end + 0.25) == [(first, Outcome.FINISHED)]
-    assert planner.take_ended(third.end) == [(second, Outcome.FINISHED), (third, Outcome.FINISHED)]
+    assert ended(planner, first.end + 0.25) == [(first, Outcome.FINISHED)]
+    assert ended(planner, third.end) == [(second, Outcome.FINISHED), (third, Outcome.FINISHED)]
 
 
 def test_a_goal_replaces_all_that_was_planned_from_its_start_on():
@@ -349,7 +355,7 @@ def test_a_goal_replaces_all_that_was_planned_from_its_start_on():
     third = planner.submit(replace(BACK, stamp=second.end + 0.5), NOW)
     now = first.end + 0.1
     last = planner.submit(replace(GOAL, stamp=second.start + 0.3), now)
-    assert planner.take_ended(now) == [
+    assert ended(planner, now) == [
         (first, Outcome.FINISHED),
         (second, Outcome.PREEMPTED),
         (third, Outcome.PREEMPTED),
@@ -363,7 +369,7 @@ def test_a_motion_that_waits_for_its_start_gives_way():
     second = planner.submit(GOAL, NOW + 1.0)
     assert second.start == pytest.approx(NOW + 1.0 + SETTINGS.lookahead)
     assert second.samples.positions[0].tolist() == [0.5, 0.0]
-    assert planner.take_ended(NOW + 1.0) == [(first, Outcome.PREEMPTED)]
+    assert ended(planner, NOW + 1.0) == [(first, Outcome.PREEMPTED)]
 
 
 def test_commands_without_a_stamp_cannot_be_spliced():
@@ -383,7 +389,7 @@ def test_planning_that_takes_too_long_leaves_the_motion_alone():
     error = reason_of(planner.submit, BACK, now, lambda: now + 0.09)
     assert error.reason is Reason.BUSY
     assert planner.motion is first
-    assert planner.take_ended(now) == []
+    assert ended(planner, now) == []
     assert (planner.track(now).efforts == track.efforts).all()
     assert planner.submit(BACK, now, lambda: now + 0.05).plan_id == 2
 
@@ -401,7 +407,7 @@ def test_a_stop_comes_to_rest_early_with_bounded_effort(elapsed):
     assert track.positions[-1, 1] == 0.0
     peak = np.abs(first.samples.efforts).max()
     assert np.abs(stop.samples.efforts).max() <= 2.0 * peak
-    assert planner.take_ended(stop.end) == [(stop, Outcome.STOPPED)]
+    assert ended(planner, stop.end) == [(stop, Outcome.STOPPED)]
 
 
 def test_a_stop_of_a_motion_that_waits_stays_at_the_start():
@@ -410,7 +416,7 @@ def test_a_stop_of_a_motion_that_waits_stays_at_the_start():
     stop = planner.stop(NOW + 1.0)
     assert (stop.samples.positions == [0.5, 0.0]).all()
     assert not stop.samples.efforts.any()
-    assert planner.take_ended(stop.end) == [(stop, Outcome.STOPPED)]
+    assert ended(planner, stop.end) == [(stop, Outcome.STOPPED)]
 
 
 def test_a_stop_may_be_overtaken_by_a_goal():
@@ -418,8 +424,8 @@ def test_a_stop_may_be_overtaken_by_a_goal():
     first = planner.submit(GOAL, NOW)
     stop = planner.stop(first.start + 0.3)
     second = planner.submit(BACK, first.start + 0.35)
-    assert planner.take_ended(first.start + 0.35) == [(stop, Outcome.PREEMPTED)]
-    assert planner.take_ended(second.end) == [(second, Outcome.FINISHED)]
+    assert ended(planner, first.start + 0.35) == [(stop, Outcome.PREEMPTED)]
+    assert ended(planner, second.end) == [(second, Outcome.FINISHED)]
 
 
 def test_there_is_nothing_to_stop_at_rest():
@@ -482,7 +488,7 @@ def test_plans_that_are_not_executed_keep_nothing_busy():
     planner = session(execute=False)
     first = planner.submit(GOAL, NOW)
     assert planner.submit(GOAL, NOW).plan_id == first.plan_id + 1
-    assert planner.take_ended(first.end) == []
+    assert ended(planner, first.end) == []
     assert planner.track(NOW).times[-1] == 1.0
 
 

@@ -16,7 +16,7 @@
 
 from math import pi
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import interfaces, stamps
@@ -69,6 +69,38 @@ class Drivers:
         self.graph.publish('/flat_planner/goal', message)
         self.graph.expect(lambda: len(self.status) > count, 'a verdict')
         return values(self.status[count])
+
+
+def test_a_motion_that_nobody_carries_out_fails_in_so_many_words(graph):
+    drivers = Drivers(graph, **{'finish.patience': 0.2})
+    graph.probe.create_timer(0.02, lambda: drivers.publish(joint1=0.25, joint2=0.0))
+    nobody = 'nobody listens to /flat_planner/joint_trajectory'
+    accepted = drivers.send(goal(duration=0.5))
+    assert accepted['state'] == 'ACCEPTED'
+    assert accepted['message'].endswith(nobody)
+    assert drivers.status[0].status[0].level == DiagnosticStatus.WARN
+    graph.expect(lambda: len(drivers.status) == 3, 'what became of it')
+    astray, failed = map(values, drivers.status[1:])
+    assert (astray['state'], astray['error_code']) == ('ASTRAY', '-4')
+    assert (failed['state'], failed['error_code']) == ('FAILED', '-5')
+    assert failed['error_name'] == 'GOAL_TOLERANCE_VIOLATED'
+    assert (failed['plan_id'], failed['joint'], failed['value']) == ('1', 'joint1', '0.25')
+    assert failed['message'] == (
+        'plan 1 was not carried out: joint1 is at 0.25 rad, not at 3.142 rad '
+        f'(finish.position_tolerance 0.1 rad): the arm has not moved; {nobody}'
+    )
+
+
+def test_an_executor_that_is_there_is_no_doubt(graph):
+    drivers = Drivers(graph)
+    commands = graph.collect(JointTrajectory, '/flat_planner/joint_trajectory')
+    drivers.publish(joint1=0.0, joint2=0.0)
+    assert 'nobody' not in drivers.send(goal(duration=0.3))['message']
+    graph.expect(lambda: commands, 'a command')
+    graph.expect(lambda: len(drivers.status) == 2, 'the end')
+    finished = values(drivers.status[1])
+    assert finished['state'] == 'FINISHED'
+    assert finished['message'].endswith('; no joint state tells whether the arm is there')
 
 
 def test_goals_before_the_first_joint_state_wait_for_it_and_keep_their_order(graph):
