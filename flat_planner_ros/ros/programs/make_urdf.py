@@ -20,7 +20,7 @@ from pathlib import Path
 import sys
 
 from flat_planner_ros.core.arm import ControlBlock, FlatPlannerError, PLUGINS
-from flat_planner_ros.ros.programs.robot_description import read_urdf
+from flat_planner_ros.ros.programs.robot_description import read_drive, read_urdf
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -75,8 +75,7 @@ def _parser() -> ArgumentParser:
     control.add_argument(
         '--command-interface',
         choices=('effort', 'position'),
-        default='effort',
-        help='of the actuated joints (default: effort)',
+        help='of the actuated joints (default: the drive in the parameter file)',
     )
     control.add_argument(
         '--hardware-param',
@@ -104,9 +103,12 @@ def _control(options: Namespace) -> ControlBlock | None:
     """Return what is asked for ros2_control."""
     if options.ros2_control is None:
         return None
+    drive = options.command_interface or read_drive(
+        options.params_file, namespace=options.namespace
+    )
     return ControlBlock(
         plugin=options.ros2_control,
-        command_interface=options.command_interface,
+        command_interface=drive,
         hardware_parameters=dict(options.hardware_param),
         controllers=options.controllers,
     )

@@ -77,6 +77,15 @@ def read_urdf(
     return urdf_of(read_settings(params_file, ROWS, build, node=node), control)
 
 
+def read_drive(params_file: Path | str | None, *, namespace: str = '') -> str:
+    """Return the drive of the arm, the name of its command interface; as `read_urdf`."""
+
+    def build(values: Values) -> str:
+        return str(values['drive'])
+
+    return read_settings(params_file, ROWS, build, node=f'{namespace}/{interfaces.PLANNER}')
+
+
 def description_of(values: Values, *, drawn_length: float | None = None) -> ArmDescription:
     """
     Return the arm that the planner's parameters state.

@@ -67,6 +67,15 @@ def test_its_options_reach_the_urdf():
     assert block.find('joint/command_interface').get('name') == 'position'
 
 
+def test_the_command_interface_is_the_drive_s(tmp_path):
+    file = tmp_path / 'arm.yaml'
+    text = (CONFIG / 'arm_2dof.yaml').read_text('utf-8')
+    for drive in ('effort', 'position'):
+        file.write_text(text.replace('drive: effort', f'drive: {drive}'), 'utf-8')
+        root = ElementTree.fromstring(make_urdf(file, '--ros2-control', 'mock').stdout.encode())
+        assert root.find('ros2_control/joint/command_interface').get('name') == drive
+
+
 def test_limits_of_the_planner_become_limits_of_the_joints(tmp_path):
     file = tmp_path / 'arm.yaml'
     file.write_text(

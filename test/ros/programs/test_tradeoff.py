@@ -53,6 +53,19 @@ def test_parameters_decide(tmp_path):
     assert worst[1] > 1.5 * worst[0]
 
 
+def test_the_drive_decides(tmp_path):
+    heavy = ['-p', 'model.inertia_star:=[6.4e-4, 2.5e-4]', '-p', 'model.stiffness:=0.023']
+    heavy += ['-p', 'model.damping:=2.0e-5', '-p', 'joints:=[joint1, joint2]']
+    worst = {}
+    for drive in ('effort', 'position'):
+        file = tmp_path / f'{drive}.csv'
+        arguments = [*MOTION, '--csv', str(file), '-p', f'drive:={drive}', *heavy]
+        assert tradeoff.main(arguments) == 0
+        worst[drive] = {row['series']: float(row['worst']) for row in rows(file)}
+    assert worst['effort'].keys() == worst['position'].keys()
+    assert worst['position']['polynomial'] != pytest.approx(worst['effort']['polynomial'], rel=0.1)
+
+
 @pytest.mark.parametrize(
     ('arguments', 'complaint'),
     [
