@@ -33,6 +33,7 @@ from flat_planner_ros.core import (
     PlanarArm,
     PlanningOptions,
     rollout,
+    Strategy,
     suggest_counterbalances,
 )
 from matplotlib import pyplot as plt
@@ -67,7 +68,7 @@ mode = arm.natural_mode()
 print(f'I*: {arm.inertia_star.both:.3e}, {arm.inertia_star.last:.3e} kg m^2')
 print(f'its spring oscillates at {mode.frequency / (2 * pi):.2f} Hz')
 
-motion = plan(request, arm, PlanningOptions())
+motion = plan(request, arm, PlanningOptions(strategy=Strategy.POLYNOMIAL))
 samples = motion.sample(0.005)
 command = EffortProfile(start=0.0, times=samples.times, efforts=samples.efforts[:, :-1])
 balanced = rollout(arm, command, until=3.0)

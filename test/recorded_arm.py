@@ -17,6 +17,7 @@
 from math import pi
 
 from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions
 from flat_planner_ros.core.plant import EffortProfile, SimulatedArm
 import numpy as np
@@ -33,7 +34,7 @@ def commanded(arm, goals=GOALS, spacing=1.5, duration=1.0, period=0.005):
     for index, goal in enumerate(goals):
         there = goal * shares
         request = MotionRequest(start=here, final=there, duration=duration)
-        samples = plan(request, arm, PlanningOptions()).sample(period)
+        samples = plan(request, arm, PlanningOptions(strategy=Strategy.POLYNOMIAL)).sample(period)
         times.append(samples.times + index * spacing + 0.1)
         efforts.append(samples.efforts[:, :-1])
         here = there

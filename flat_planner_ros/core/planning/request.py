@@ -141,8 +141,7 @@ class PlanningOptions:
     Attributes
     ----------
     strategy
-        Which cost; by default the one that has no weight to choose. The planner node's parameter
-        has a default of its own, the least effort, as its weights have defaults too.
+        Which cost, or which law of its own.
     r, p
         Weights of effort and potential energy, as in `strategy_cost`.
     custom
@@ -158,7 +157,7 @@ class PlanningOptions:
 
     """
 
-    strategy: Strategy = Strategy.POLYNOMIAL
+    strategy: Strategy = Strategy.MIN_CONTROL_EFFORT
     r: float = 150.0
     p: float = 17.0
     custom: FloatArray | None = None

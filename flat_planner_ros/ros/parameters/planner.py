@@ -82,10 +82,9 @@ LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
 
 ROWS = [
     *MODEL_ROWS,
-    # The node's own choice: the core's default is the plainest law.
     Row(
         'strategy',
-        Strategy.MIN_CONTROL_EFFORT,
+        PlanningOptions.strategy,
         '',
         'what the motion law minimises besides its sixth derivative',
     ),

@@ -278,7 +278,7 @@ def test_more_weight_is_more_effort_and_less_residual(nominal, criterion):
 @pytest.mark.parametrize('duration', [0.1, 0.5, 1.0, 3.0, 10.0, 60.0, 600.0])
 def test_any_duration(duration, nominal):
     result, left = planned(duration, nominal=nominal)
-    polynomial = plan(result.request, ARM, PlanningOptions())
+    polynomial = plan(result.request, ARM, PlanningOptions(strategy=Strategy.POLYNOMIAL))
     effort = polynomial.sample(duration / 4000.0).driving_effort
     other = predict_residual(ARM, effort, duration, BOX)
     assert result.boundary_residual < 1e-9

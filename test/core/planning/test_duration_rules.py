@@ -139,7 +139,12 @@ def test_a_static_load_is_named_as_such():
     rules = rules_of(JointLimits.of(3, effort=[3.0, inf, inf]), joints=('a', 'b', 'c'))
     for is_prescribed in (False, True):
         with pytest.raises(RequestRejected, match=words) as refusal:
-            rules.plan_within(request, LOADED, PlanningOptions(), is_prescribed=is_prescribed)
+            rules.plan_within(
+                request,
+                LOADED,
+                PlanningOptions(strategy=Strategy.POLYNOMIAL),
+                is_prescribed=is_prescribed,
+            )
         assert refusal.value.reason is Reason.EFFORT_LIMIT
         assert refusal.value.value == pytest.approx(5.886, rel=1e-3)
 
@@ -166,7 +171,10 @@ def test_an_arm_just_outside_its_range_may_move_back_but_not_further_out():
 def session(arm, position=0.0, **changes):
     """Return a session that has seen its arm at rest."""
     settings = SessionSettings(
-        joints=('shoulder', 'elbow'), arm=arm, options=PlanningOptions(), **changes
+        joints=('shoulder', 'elbow'),
+        arm=arm,
+        options=PlanningOptions(strategy=Strategy.POLYNOMIAL),
+        **changes,
     )
     made = PlannerSession(settings)
     made.measure(
@@ -270,4 +278,4 @@ def test_an_arm_stops_even_if_its_limits_were_lowered_in_motion(paper_arm):
 def plan_of_session(arm):
     """Return the half turn of 1 s that sessions here plan."""
     request = MotionRequest(start=[0.0, 0.0], final=[pi, 0.0], duration=1.0)
-    return plan(request, arm, PlanningOptions())
+    return plan(request, arm, PlanningOptions(strategy=Strategy.POLYNOMIAL))

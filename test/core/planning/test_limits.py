@@ -160,7 +160,9 @@ def test_extrema_of_other_laws(paper_arm, kind):
 
 def test_extrema_of_the_polynomial_law_are_roots_of_polynomials(paper_arm):
     duration = 0.6
-    planned = half_turn(paper_arm, duration, flat_model=FlatModel.EXACT)
+    planned = half_turn(
+        paper_arm, duration, strategy=Strategy.POLYNOMIAL, flat_model=FlatModel.EXACT
+    )
     # w' is proportional to (t (T - t))^5.
     bump = Polynomial([0.0, duration, -1.0]) ** 5
     w = bump.integ()
@@ -228,7 +230,9 @@ def test_a_thin_layer_between_coarse_nodes_is_found(paper_arm):
 
 def test_a_motion_over_no_distance_has_no_extent(paper_arm):
     request = MotionRequest(start=[0.3, 0.0], final=[0.3, 0.0], duration=1.0)
-    position, velocity, effort = extrema_of(plan(request, paper_arm, PlanningOptions()))
+    position, velocity, effort = extrema_of(
+        plan(request, paper_arm, PlanningOptions(strategy=Strategy.POLYNOMIAL))
+    )
     assert position.highest.tolist() == position.lowest.tolist() == [0.3, 0.0]
     assert not velocity.peak.any()
     assert not effort.peak.any()

@@ -567,7 +567,7 @@ def test_a_request_keeps_locked_copies():
 def test_refuses_a_request_that_does_not_fit_the_arm(paper_arm, start, final, message):
     request = MotionRequest(start=start, final=final, duration=1.0)
     with pytest.raises(InvalidRequest, match=message):
-        plan(request, paper_arm, PlanningOptions())
+        plan(request, paper_arm, PlanningOptions(strategy=Strategy.POLYNOMIAL))
 
 
 def test_refuses_an_arm_or_a_weight_that_defines_no_problem(paper_arm):
@@ -580,7 +580,7 @@ def test_refuses_an_arm_or_a_weight_that_defines_no_problem(paper_arm):
         damping=0.0,
     )
     with pytest.raises(NotFlat):
-        plan(half_turn(), unbalanced, PlanningOptions())
+        plan(half_turn(), unbalanced, PlanningOptions(strategy=Strategy.POLYNOMIAL))
     with pytest.raises(InvalidCost, match='r = -1'):
         plan(half_turn(), paper_arm, PlanningOptions(strategy=Strategy.MIXED, r=-1.0))
 

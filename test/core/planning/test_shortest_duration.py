@@ -214,7 +214,11 @@ def test_a_motion_that_has_begun_obeys_too(paper_arm):
     limits = JointLimits.of(2, effort=[0.02, inf], velocity=[8.0, inf])
 
     def onwards(duration):
-        return plan(replace(request, duration=duration), paper_arm, PlanningOptions())
+        return plan(
+            replace(request, duration=duration),
+            paper_arm,
+            PlanningOptions(strategy=Strategy.POLYNOMIAL),
+        )
 
     found = shortest_plan(onwards, limits, **RANGE)
     assert uses_of(found, limits) <= 1.0

@@ -155,7 +155,11 @@ def test_no_advice_from_the_midst_of_a_motion():
 
 def test_the_plane_of_effort_and_residual():
     points = tradeoff_points(
-        REQUEST, ARM, PlanningOptions(), stretches=(1.0, 1.2), weights=(30.0, 100.0)
+        REQUEST,
+        ARM,
+        PlanningOptions(strategy=Strategy.POLYNOMIAL),
+        stretches=(1.0, 1.2),
+        weights=(30.0, 100.0),
     )
     singles = [point for point in points if point.weight == 0.0]
     assert [point.series for point in singles] == [

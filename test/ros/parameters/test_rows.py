@@ -46,7 +46,7 @@ def test_a_planner_without_parameters_has_the_defaults_of_the_core():
     assert_equal_but_for(['limits'], session, core)
     for limit in fields(JointLimits):
         assert not any(map(isfinite, getattr(session.limits, limit.name)))
-    assert_equal_but_for(['strategy'], session.options, PlanningOptions())
+    assert_equal_but_for([], session.options, PlanningOptions())
     assert session.options.insensitivity == Insensitivity()
 
 
