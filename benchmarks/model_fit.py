@@ -61,7 +61,7 @@ def _row(sensors: tuple[float, float, int], cases: int) -> tuple[object, ...]:
     for case in range(cases):
         rng = np.random.default_rng(case)
         believed, true = _arms(rng)
-        goals = rng.uniform(-pi, pi, GOALS)
+        goals = tuple(rng.uniform(-pi, pi, GOALS))
         seen = recorded(true, believed, rate=rate, noise=noise, step=step, seed=case, goals=goals)
         begun = process_time()
         fit = fit_model(seen, believed)

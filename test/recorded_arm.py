@@ -14,6 +14,7 @@
 
 """Recordings of simulated arms: goals planned with one arm, played by another, seen by sensors."""
 
+from functools import lru_cache
 from math import pi
 
 from flat_planner_ros.core.model_fit import Measurements
@@ -43,6 +44,16 @@ def commanded(arm, goals=GOALS, spacing=1.5, duration=1.0, period=0.005):
 
 def recorded(true, believed, *, rate=200.0, until=6.2, noise=0.0, step=0.0, seed=0, **command):
     """Return what the sensors show: angles with noise [rad], then rounded to steps [rad]."""
+    times, positions, efforts = played(true, believed, rate, until, **command)
+    angles = positions + noise * np.random.default_rng(seed).standard_normal(positions.shape)
+    if step:
+        angles = step * np.round(angles / step)
+    return Measurements(times=times, positions=angles, efforts=efforts)
+
+
+@lru_cache
+def played(true, believed, rate, until, **command):
+    """Return times, angles and efforts while a command for one arm plays on another."""
     profile = commanded(believed, **command)
     simulated = SimulatedArm(true)
     simulated.command(profile, 0.0)
@@ -52,8 +63,4 @@ def recorded(true, believed, *, rate=200.0, until=6.2, noise=0.0, step=0.0, seed
         simulated.advance(time)
         positions.append(simulated.position)
         efforts.append(profile.effort(time))
-    random = np.random.default_rng(seed)
-    angles = np.array(positions) + noise * random.standard_normal((times.size, true.n))
-    if step:
-        angles = step * np.round(angles / step)
-    return Measurements(times=times, positions=angles, efforts=np.array(efforts))
+    return times, np.array(positions), np.array(efforts)

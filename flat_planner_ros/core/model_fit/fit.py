@@ -179,7 +179,7 @@ def _observed(measurements: Measurements, period: float) -> Observed:
 
 def _noise(measurements: Measurements) -> FloatArray:
     """Return the noise of link n-1 and of the passive joint, shape (2,) [rad]."""
-    each = np.array([noise_of(column) for column in measurements.positions.T])
+    each = noise_of(measurements)
     return np.array([np.linalg.norm(each[:-1]), each[-1]])
 
 

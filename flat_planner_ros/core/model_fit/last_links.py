@@ -84,13 +84,11 @@ class Forcing(NamedTuple):
     base: FloatArray
 
 
-class _Step(NamedTuple):
-    """Transition (P, 4, 4), and what force at the start, middle and end adds (P, 4, 1)."""
+class _Flow(NamedTuple):
+    """Transition (P, 4, 4), and what forces at the start, middle and end add (P, 4, 3)."""
 
     transition: FloatArray
-    start: FloatArray
-    middle: FloatArray
-    end: FloatArray
+    forced: FloatArray
 
 
 def step_for(parameters: FloatArray, has_friction: bool) -> float:
@@ -127,20 +125,22 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
     steps = (forcing.base.shape[0] - 1) // 2
     states = np.empty((steps + 1, *starts.shape))
     states[0] = starts
-    whole, half = _linear_step(models, forcing.step), _linear_step(models, forcing.step / 2)
-    viscous, coulomb = models[:, VISCOUS, None], models[:, COULOMB, None]
-    has_friction = bool(coulomb.any())
+    whole = _linear_flow(models, forcing.step)
     # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
-    drag = viscous * forcing.base[:, None, :]
+    drag = models[:, VISCOUS, None] * forcing.base[:, None, :]
+    forces = forcing.effort[:, forcing.variant] + drag
+    triples = np.stack((forces[:-2:2], forces[1:-1:2], forces[2::2]), axis=-2)
+    pushed = whole.forced @ triples
+    if models[:, COULOMB].any():
+        half = _linear_flow(models, forcing.step / 2)
+        _add_with_friction(states, pushed, triples, models, forcing.base, whole, half)
+        return states
     for k in range(steps):
-        forces = forcing.effort[2 * k : 2 * k + 3, forcing.variant] + drag[2 * k : 2 * k + 3]
-        if has_friction:
-            forces = _with_friction(states[k], forces, forcing.base[2 * k :], coulomb, whole, half)
-        states[k + 1] = _moved(states[k], forces, whole)
+        states[k + 1] = whole.transition @ states[k] + pushed[k]
     return states
 
 
-def _linear_step(models: FloatArray, step: float) -> _Step:
+def _linear_flow(models: FloatArray, step: float) -> _Flow:
     """Return how states and forces act on the state a step later."""
     link = models[:, BOTH] - models[:, LAST]
     count = len(models)
@@ -156,14 +156,14 @@ def _linear_step(models: FloatArray, step: float) -> _Step:
     augmented[:, 3, 3] -= models[:, DAMPING] / models[:, LAST]
     augmented[:, 4, 5] = augmented[:, 5, 6] = 1.0
     flow = _exponential(step * augmented)[:, :STATES]
-    value, slope, bend = (flow[:, :, j : j + 1] for j in (4, 5, 6))
+    value, slope, bend = (flow[:, :, j] for j in (4, 5, 6))
     # The parabola through three forces: slope (-3, 4, -1)/h and second derivative (4, -8, 4)/h^2.
-    return _Step(
-        flow[:, :, :STATES],
+    forced = (
         value - 3 / step * slope + 4 / step**2 * bend,
         4 / step * slope - 8 / step**2 * bend,
         -slope / step + 4 / step**2 * bend,
     )
+    return _Flow(flow[:, :, :STATES], np.stack(forced, axis=-1))
 
 
 def _exponential(matrices: FloatArray) -> FloatArray:
@@ -176,32 +176,33 @@ def _exponential(matrices: FloatArray) -> FloatArray:
     return total
 
 
-def _moved(state: FloatArray, forces: FloatArray, step: _Step) -> FloatArray:
-    """Return the state a step later."""
-    first, middle, last = forces[:, :, None, :]
-    moved: FloatArray = step.transition @ state
-    moved += step.start * first
-    moved += step.middle * middle
-    moved += step.end * last
-    return moved
-
-
-def _with_friction(
-    state: FloatArray,
-    forces: FloatArray,
+def _add_with_friction(
+    states: FloatArray,
+    pushed: FloatArray,
+    triples: FloatArray,
+    models: FloatArray,
     base: FloatArray,
-    coulomb: FloatArray,
-    whole: _Step,
-    half: _Step,
-) -> FloatArray:
-    """Return the forces less Coulomb friction, whose velocities are predicted in two stages."""
-    first = forces[0] - coulomb * coulomb_share(state[:, 2] - base[0])
-    # To the middle with the friction of the start, to the end with that of the middle.
-    held = forces[0] - first
-    near = (forces[0] + forces[1]) / 2 - held
-    velocity = _moved(state, np.array([first, near, forces[1] - held]), half)[:, 2]
-    middle = forces[1] - coulomb * coulomb_share(velocity - base[1])
-    ahead = 2 * (forces[1] - middle) - held
-    velocity = _moved(state, np.array([first, middle, forces[2] - ahead]), whole)[:, 2]
-    last = forces[2] - coulomb * coulomb_share(velocity - base[2])
-    return np.array([first, middle, last])
+    whole: _Flow,
+    half: _Flow,
+) -> None:
+    """Fill in the states one by one; velocities for Coulomb friction are predicted in stages."""
+    coulomb = models[:, COULOMB, None]
+    # Of the first half step only the velocity of link n-1 is wanted.
+    flow = np.concatenate((whole.transition, half.transition[:, 2:3]), axis=1)
+    first, middle = triples[..., 0, :], triples[..., 1, :]
+    near = np.stack((first, (first + middle) / 2, middle), axis=-2)
+    pushed_half = (half.forced[:, 2:3] @ near)[:, :, 0]
+    by_half = half.forced[:, 2].sum(axis=1)[:, None]
+    by_first, by_middle, by_last = (column[:, None] for column in whole.forced[:, 2].T)
+    by_start, by_second = by_first - by_last, by_middle + 2 * by_last
+    drags = np.empty((len(models), 3, states.shape[-1]))
+    for k, push in enumerate(pushed):
+        free = flow @ states[k]
+        # To the middle with the friction of the start, to the end with that of the middle.
+        held = coulomb * coulomb_share(states[k, :, 2] - base[2 * k])
+        velocity = free[:, 4] + pushed_half[k] - by_half * held
+        second = coulomb * coulomb_share(velocity - base[2 * k + 1])
+        velocity = free[:, 2] + push[:, 2] - by_start * held - by_second * second
+        drags[:, 0], drags[:, 1] = held, second
+        drags[:, 2] = coulomb * coulomb_share(velocity - base[2 * k + 2])
+        states[k + 1] = free[:, :STATES] + push - whole.forced @ drags

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from math import comb, sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.core.model_fit.signals import stretches
 import numpy as np
 import numpy.typing as npt
 
@@ -89,20 +90,22 @@ class Measurements:
         return float(np.median(np.diff(self.times)))
 
 
-def noise_of(angle: FloatArray) -> float:
-    """
-    Return the standard deviation of white noise and rounding in a smooth signal [rad].
-
-    Parameters
-    ----------
-    angle
-        Evenly sampled, shape (m,) [rad].
-
-    """
-    differences = np.diff(angle, DIFFERENCE_ORDER)
+def noise_of(measurements: Measurements) -> FloatArray:
+    """Return the spread of noise and rounding in each smooth joint angle, shape (n,) [rad]."""
+    times, positions = measurements.times, measurements.positions
     gain = sqrt(comb(2 * DIFFERENCE_ORDER, DIFFERENCE_ORDER))
-    rounding = encoder_step(angle) / sqrt(12.0)
-    return max(float(np.sqrt(np.mean(differences**2))) / gain, rounding)
+    differences = np.concatenate(
+        [
+            np.diff(positions[first:last], DIFFERENCE_ORDER, axis=0)
+            for first, last in stretches(times, measurements.period)
+        ]
+    )
+    if not differences.size:
+        raise InvalidRequest('the measurements have no stretch without gaps')
+    rounding = np.array([encoder_step(column) for column in positions.T]) / sqrt(12.0)
+    white = np.sqrt(np.mean(differences**2, axis=0)) / gain
+    found: FloatArray = np.maximum(white, rounding)
+    return found
 
 
 def moves_of(angle: FloatArray, step: float) -> npt.NDArray[np.bool_]:

@@ -47,6 +47,9 @@ DIFFERENCE = 1e-6
 BLOCK = 20
 """Segments that are simulated side by side: a minute of motion."""
 
+CHUNK = 256
+"""Steps whose states are held at a time: memory does not grow with the recording."""
+
 MOST_STEPS = 40
 """Largest number of linearisations."""
 
@@ -327,25 +330,36 @@ def _segments(
 
 def _seen(
     observed: Observed, block: Sequence[Segment], models: FloatArray, starts: FloatArray
-) -> Iterator[FloatArray]:
-    """Yield for each segment what the sensors would show of every model, (m, models, 2) [rad]."""
+) -> list[FloatArray]:
+    """Return for each segment what the sensors would show of every model, (m, models, 2) [rad]."""
     t = observed.times
     begins = t[[segment.first for segment in block]]
     longest = max(float(t[s.last - 1] - t[s.first]) for s in block)
     step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
     steps = int(np.ceil(longest / step)) + 1
-    grid = begins + np.arange(2 * steps + 1)[:, None] * step / 2
-    states = trajectories(models, starts, _forcing(observed, models, grid, step))
-    for number, segment in enumerate(block):
-        elapsed = t[segment.first : segment.last] - begins[number]
-        node = np.minimum((elapsed / step).astype(int), steps - 1)
-        share = (elapsed / step - node)[:, None, None]
-        here, there = states[node, :, :, number], states[node + 1, :, :, number]
-        angles = hermite(
-            share, np.array(step), here[..., :2], there[..., :2], here[..., 2:], there[..., 2:]
-        )
+    elapsed = [t[s.first : s.last] - begin for s, begin in zip(block, begins, strict=True)]
+    seen = [np.empty((each.size, len(models), CHANNELS)) for each in elapsed]
+    for first in range(0, steps, CHUNK):
+        last = min(first + CHUNK, steps)
+        grid = begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
+        states = trajectories(models, starts, _forcing(observed, models, grid, step))
+        starts = states[-1]
+        for number, angles in enumerate(seen):
+            inside = slice(*np.searchsorted(elapsed[number] / step, (first, last)))
+            share = elapsed[number][inside] / step - first
+            angles[inside] = _between_states(states[..., number], share, step)
+    for angles in seen:
         angles[..., 1] += models[:, OFFSET]
-        yield angles
+    return seen
+
+
+def _between_states(states: FloatArray, at: FloatArray, step: float) -> FloatArray:
+    """Return both angles between states (K + 1, models, 4) at times [steps], (m, models, 2)."""
+    node = at.astype(int)
+    share = (at - node)[:, None, None]
+    here, there = states[node], states[node + 1]
+    ends = here[..., :2], there[..., :2], here[..., 2:], there[..., 2:]
+    return hermite(share, np.array(step), *ends)
 
 
 def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: float) -> Forcing:

@@ -14,6 +14,7 @@
 
 """Signals between their samples, smoothed derivatives, and pieces of a recording."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
@@ -47,13 +48,18 @@ def segments_of(times: FloatArray, period: float, longest: float) -> list[Segmen
         Bound on the time that a piece spans [s].
 
     """
-    gaps = np.flatnonzero(np.diff(times) > GAP * period) + 1
     pieces = []
-    for first, last in zip([0, *gaps], [*gaps, times.size], strict=True):
+    for first, last in stretches(times, period):
         count = max(1, round(float(times[last - 1] - times[first]) / longest))
         cuts = np.linspace(first, last, count + 1).astype(int)
         pieces += [Segment(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
     return [piece for piece in pieces if piece.last - piece.first >= SHORTEST]
+
+
+def stretches(times: FloatArray, period: float) -> list[Segment]:
+    """Return the pieces of a recording between gaps, its usual period being known [s]."""
+    gaps = (np.flatnonzero(np.diff(times) > GAP * period) + 1).tolist()
+    return [Segment(*ends) for ends in pairwise([0, *gaps, times.size])]
 
 
 def between(times: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
@@ -71,6 +77,10 @@ def between(times: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray
 
     """
     inside = np.clip(at, times[0], times[-1])
+    # Slopes are needed next to the times only, and a recording may be long.
+    first = max(int(np.searchsorted(times, inside.min())) - 2, 0)
+    near = slice(first, int(np.searchsorted(times, inside.max())) + 3)
+    times, values = times[near], values[near]
     index = np.clip(np.searchsorted(times, inside, side='right') - 1, 0, times.size - 2)
     slopes = np.gradient(values, times)
     step = times[index + 1] - times[index]
@@ -113,9 +123,6 @@ def derivatives(
         Of the polynomials.
 
     """
-    # Slow to import, and only fits need it.
-    from scipy.signal import savgol_filter
-
     period = float(np.median(np.diff(times)))
     count = max(round(float(times[-1] - times[0]) / period), 2 * degree) + 1
     grid = np.linspace(times[0], times[-1], count)
@@ -123,8 +130,27 @@ def derivatives(
     window -= 1 - window % 2
     even = np.column_stack([np.interp(grid, times, column) for column in angles.T])
     spacing = float(grid[1] - grid[0])
+    found = [
+        np.column_stack([np.interp(times, grid, column) for column in smooth.T])
+        for smooth in _smoothed(even, window, degree, spacing)
+    ]
+    return found[0], found[1], found[2]
+
+
+def _smoothed(even: FloatArray, window: int, degree: int, spacing: float) -> list[FloatArray]:
+    """Return even samples (m, n) and two derivatives by polynomials over a window of samples."""
+    # Not scipy's: its signal processing alone takes 40 MB and a second to load.
+    half = window // 2
+    places = np.arange(-half, half + 1) * spacing
+    scale = half * spacing
+    fit = np.linalg.pinv(np.vander(places / scale, degree + 1, increasing=True))
     found = []
     for order in range(3):
-        smooth = savgol_filter(even, window, degree, deriv=order, delta=spacing, axis=0)
-        found.append(np.column_stack([np.interp(times, grid, column) for column in smooth.T]))
-    return found[0], found[1], found[2]
+        rows = np.polynomial.polynomial.polyder(fit, order) / scale**order
+        inside = [np.correlate(column, rows[0], mode='valid') for column in even.T]
+        powers = np.vander(places / scale, degree + 1 - order, increasing=True)
+        # At both ends the polynomial of the last whole window goes on.
+        before = powers[:half] @ rows @ even[:window]
+        after = powers[half + 1 :] @ rows @ even[-window:]
+        found.append(np.concatenate((before, np.column_stack(inside), after)))
+    return found
