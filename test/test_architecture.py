@@ -56,6 +56,7 @@ MESSAGES_ALLOWED = {
     'model_adoption.py': 'hears reports and answers a service for the planner node',
     'row.py': 'descriptors of parameters, from rcl_interfaces',
     'node_parameters.py': 'verdicts on changed parameters, from rcl_interfaces',
+    'guarded_callbacks.py': 'answers requests that rclpy cannot read, from rcl_interfaces',
     'stamps.py': 'stamps to seconds and back',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
 }

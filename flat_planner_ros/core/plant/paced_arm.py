@@ -278,7 +278,7 @@ class PacedArm:
         elif lag < -MAX_BACKWARD:
             self._incidents.set_back -= lag
             self._offset += lag
-            self._drop()
+            self.drop()
         return self._advance(now - self._offset)
 
     def lead(self, wall: float, factor: float) -> list[ArmState]:
@@ -382,7 +382,7 @@ class PacedArm:
             f'{tolerance:g} rad'
         )
 
-    def _drop(self) -> None:
+    def drop(self) -> None:
         """Apply nothing any more."""
         self._simulated.release()
         self._profile = None
@@ -397,4 +397,4 @@ class PacedArm:
             return
         if profile is not None and self.time - lag < profile.end:
             self._incidents.has_dropped = True
-        self._drop()
+        self.drop()

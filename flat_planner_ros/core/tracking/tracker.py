@@ -117,6 +117,14 @@ class Tracker:
         if self.phase is Phase.TRACKING:
             self.phase, self._released, self._last = Phase.RELEASING, now, self._efforts
 
+    def drop(self, now: float) -> FloatArray | None:
+        """Return zero efforts, from now on and without a ramp; None if none were applied."""
+        was_idle = self.phase is Phase.IDLE
+        self.release(now)
+        self.phase = Phase.IDLE
+        self._efforts = np.zeros(self._joints - 1)
+        return None if was_idle else self._efforts
+
     def take_fault(self) -> str:
         """Return why tracking was given up since this was last asked; nothing if it was not."""
         fault, self._fault = self._fault, ''

@@ -31,10 +31,10 @@ from flat_planner_ros.ros.live_view.page_settings import (
     number_within,
     SETTINGS,
 )
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.serialization import deserialize_message
@@ -82,7 +82,7 @@ LEVELS = {
 }
 
 
-class LiveNode(Node):
+class LiveNode(GuardedNode):
     """
     Feeds browsers and carries out what they ask for.
 

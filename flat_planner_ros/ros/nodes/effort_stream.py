@@ -14,7 +14,7 @@
 
 """Stream of efforts for executors that take one effort after the other, not a trajectory."""
 
-from flat_planner_ros.core.session import PlannerSession
+from flat_planner_ros.core.session import Motion, PlannerSession
 from flat_planner_ros.ros.wire import conversions, stamps
 import numpy as np
 from rclpy.node import Node
@@ -50,6 +50,7 @@ class EffortStream:
         self._timer: Timer | None = None
         self._period = 0.0
         self._zeros_left = 0
+        self._given_up: Motion | None = None
 
     def configure(self, enabled: bool, period: float) -> None:
         """Stream with a period [s] from now on, or no more."""
@@ -70,15 +71,28 @@ class EffortStream:
             self._publish(np.zeros(len(self._session.settings.joints) - 1))
             self._zeros_left = 0
 
+    def rest(self) -> None:
+        """Stream zeros instead of what is left of the present motion."""
+        self._given_up = self._session.motion
+        self._send_zero()
+
     def _on_tick(self) -> None:
         """Publish the effort planned for the middle of the coming period."""
+        if self._given_up is not None and self._session.motion is self._given_up:
+            self._send_zero()
+            return
         now = stamps.now(self._node.get_clock())
         is_moving = self._session.moves(now, now + self._period)
         samples = self._session.reference(now + 0.5 * self._period) if is_moving else None
         if samples is not None:
             self._zeros_left = FINAL_ZEROS
             self._publish(samples.efforts[0, :-1])
-        elif self._zeros_left:
+        else:
+            self._send_zero()
+
+    def _send_zero(self) -> None:
+        """Publish one of the zeros that follow efforts, if one is left."""
+        if self._zeros_left:
             self._zeros_left -= 1
             self._publish(np.zeros(len(self._session.settings.joints) - 1))
 

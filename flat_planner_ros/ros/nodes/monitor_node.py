@@ -28,6 +28,7 @@ from flat_planner_ros.core.monitor import (
 )
 from flat_planner_ros.ros.nodes.early_loading import load_early, REPORTING
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
@@ -38,7 +39,6 @@ from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
@@ -60,7 +60,7 @@ WARNING_PERIOD = 5.0
 """Shortest time between two warnings about the same input [s]."""
 
 
-class MonitorNode(Node):
+class MonitorNode(GuardedNode):
     """Judges what each latched plan leaves behind; options as for `rclpy.node.Node`."""
 
     def __init__(self, **options: Any) -> None:

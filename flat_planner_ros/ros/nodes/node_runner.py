@@ -17,13 +17,11 @@
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import wraps
 import os
 import re
 import signal
 import sys
 from threading import Event
-from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.programs import SIGNALS
@@ -92,7 +90,6 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
                 if interrupted.is_set():
                     return 0
                 nodes.append(create())
-                _pardon_shutdown(nodes[-1])
                 executor.add_node(nodes[-1])
             introduce(nodes, sys.argv if args is None else args)
             for node in nodes:
@@ -120,31 +117,6 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
                 node.destroy_node()
             rclpy.try_shutdown()
     return 0
-
-
-def _pardon_shutdown(node: Node) -> None:
-    """
-    Let callbacks fail without a word where another thread has shut the context down meanwhile.
-
-    The executor would log each of them as fatal, with a traceback, before `run` sees it.
-    """
-
-    def pardoned(callback: Callable[..., Any]) -> Callable[..., Any]:
-        # Its signature, too: a subscription may ask for more than the message.
-        @wraps(callback)
-        def call(*args: Any) -> Any:
-            try:
-                return callback(*args)
-            except RuntimeError:
-                if node.context.ok():
-                    raise
-                return args[-1] if args else None  # of a service: the response, to nobody
-
-        return call
-
-    entities: list[Any] = [*node.timers, *node.subscriptions, *node.services]
-    for entity in entities:
-        entity.callback = pardoned(entity.callback)
 
 
 def _explained(error: Exception) -> int:

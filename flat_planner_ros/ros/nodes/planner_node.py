@@ -28,6 +28,7 @@ from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch, unheard
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import planner_sentence
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
@@ -35,7 +36,6 @@ from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
@@ -45,7 +45,7 @@ WARNING_PERIOD = 5.0
 """Shortest time between two warnings about the same input [s]."""
 
 
-class PlannerNode(Node):
+class PlannerNode(GuardedNode):
     """Answers goals with motions of one arm; options as for `rclpy.node.Node`."""
 
     def __init__(self, **options: Any) -> None:
@@ -100,6 +100,10 @@ class PlannerNode(Node):
         self.create_subscription(
             JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA
         )
+
+    def rest(self) -> None:
+        """Stream zeros until the next motion; a command that was sent ends at rest by itself."""
+        self._efforts.rest()
 
     def destroy_node(self) -> None:
         """End the stream of efforts with zeros, then the node."""

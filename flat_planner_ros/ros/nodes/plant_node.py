@@ -21,6 +21,7 @@ from typing import Any
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidCommand
 from flat_planner_ros.core.plant import ArmState, PacedArm
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
@@ -29,7 +30,6 @@ from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
-from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -43,7 +43,7 @@ WARNING_PERIOD = 1.0
 """Time between two reports of what goes wrong again and again [s]."""
 
 
-class PlantNode(Node):
+class PlantNode(GuardedNode):
     """Moves one simulated arm; options as for `rclpy.node.Node`."""
 
     def __init__(self, **options: Any) -> None:
@@ -69,6 +69,10 @@ class PlantNode(Node):
         self.create_timer(1.0 / rate, self._on_tick, clock=self._steady)
         self.create_timer(WARNING_PERIOD, self._on_watch, clock=self._steady)
         self._on_tick()
+
+    def rest(self) -> None:
+        """Drop the command."""
+        self._arm.drop()
 
     @property
     def introduction(self) -> str:

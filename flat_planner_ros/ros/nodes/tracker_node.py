@@ -21,6 +21,7 @@ from typing import Any
 from flat_planner_ros.core.arm import Drive, FlatPlannerError, FloatArray
 from flat_planner_ros.core.tracking import Tracker
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
@@ -29,7 +30,6 @@ from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.tracked_motion import tracked_motion
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
@@ -45,7 +45,7 @@ WARNING_PERIOD = 1.0
 """Shortest time between two warnings about the same input [s]."""
 
 
-class TrackerNode(Node):
+class TrackerNode(GuardedNode):
     """Turns the planner's command and joint states into efforts."""
 
     def __init__(self, **options: Any) -> None:
@@ -79,6 +79,10 @@ class TrackerNode(Node):
             interfaces.topic_of(interfaces.PLANNER, interfaces.COMMAND)
         )
         return f'{arm_sentence(self._joints, Drive.EFFORT)}; tracks the command on {command}'
+
+    def rest(self) -> None:
+        """Give no more efforts until the next command; the last ones are zero."""
+        self._send(self._tracker.drop(self._now()))
 
     def _now(self) -> float:
         """Return the node's time [s]."""

@@ -21,12 +21,12 @@ from time import time_ns
 from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.recording.recording import PARAMETERS, RecordingWriter
 from flat_planner_ros.ros.wire import interfaces
 from flat_planner_ros.ros.wire.joint_states import NO_STAMP
 from flat_planner_ros.ros.wire.message_types import definition, message_class, UnknownType
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -79,7 +79,7 @@ class RecordingFailed(FlatPlannerError):
     """The file cannot be opened; the message says why."""
 
 
-class RecorderNode(Node):
+class RecorderNode(GuardedNode):
     """
     Writes messages as they come, serialised, with their definitions.
 

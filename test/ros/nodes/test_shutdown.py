@@ -56,12 +56,12 @@ sys.exit(main())
 
 OVERTAKEN = """
 import sys
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.node_runner import run
 import rclpy
-from rclpy.node import Node
 from std_msgs.msg import String
 
-class Overtaken(Node):
+class Overtaken(GuardedNode):
     def __init__(self):
         super().__init__('overtaken')
         self.topic = self.create_publisher(String, 'topic', 1)

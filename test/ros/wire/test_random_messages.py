@@ -38,6 +38,15 @@ from hypothesis import given, HealthCheck, Phase, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy.serialization import serialize_message
 from ros.rig import goal, Planner
 from sensor_msgs.msg import JointState
@@ -325,6 +334,48 @@ def test_random_parameters_are_refused_or_consistent(graph, node_class, rows):
             assert node._configuration.settings is before
 
     change()
+
+
+@st.composite
+def parameter_messages(draw):
+    """Return a parameter of any type, with values for some of the types."""
+    value = ParameterValue(
+        type=draw(st.one_of(st.integers(0, 9), st.integers(0, 255))),
+        bool_value=draw(st.booleans()),
+        integer_value=draw(st.integers(-(2**63), 2**63 - 1)),
+        double_value=draw(numbers),
+        string_value=draw(st.text(texts, max_size=20)),
+        double_array_value=draw(st.lists(numbers, max_size=5)),
+        string_array_value=draw(st.lists(st.text(texts, max_size=5), max_size=3)),
+    )
+    own = st.sampled_from([row.name for row in ROWS] + ['use_sim_time', ''])
+    return Parameter(name=draw(st.one_of(own, st.text(texts, max_size=20))), value=value)
+
+
+def test_random_requests_are_answered(graph):
+    goals = Goals(graph)
+    lists = st.lists(parameter_messages(), max_size=4)
+    words = st.lists(st.text(texts, max_size=20), max_size=4)
+
+    def ask(kind, service, **fields):
+        return graph.call(kind, f'/flat_planner/{service}', kind.Request(**fields))
+
+    @random_messages(100)
+    @given(lists, words, st.integers(0, 2**64 - 1))
+    def send(parameters, texts, depth):
+        results = ask(SetParameters, 'set_parameters', parameters=parameters).results
+        assert len(results) == len(parameters)
+        ask(SetParametersAtomically, 'set_parameters_atomically', parameters=parameters)
+        for kind, service in (
+            (GetParameters, 'get_parameters'),
+            (GetParameterTypes, 'get_parameter_types'),
+            (DescribeParameters, 'describe_parameters'),
+        ):
+            ask(kind, service, names=texts)
+        ask(ListParameters, 'list_parameters', prefixes=texts, depth=depth)
+
+    send()
+    assert goals.send(goal(1.0, 1.0))['state'] in ('ACCEPTED', 'REJECTED')
 
 
 def _still_serves(graph, goals: Goals, monitor) -> None:
