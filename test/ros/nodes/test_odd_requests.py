@@ -166,8 +166,9 @@ def test_a_planner_at_rest_after_an_error_streams_zeros_until_the_next_motion(gr
     assert rig.send(1.0, 3.0)['state'] == 'ACCEPTED'
     graph.expect(lambda: efforts and any(efforts[-1].data), 'efforts')
     rig.node.rest()
+    graph.expect(lambda: not any(efforts[-1].data), 'the first zero')
     efforts.clear()
-    graph.expect(lambda: len(efforts) > 3, 'zeros')
+    graph.expect(lambda: len(efforts) > 3, 'more of them')
     assert not any(any(msg.data) for msg in efforts)
     rig.measure()
     rig.ask(goal(0.5, 3.0))
