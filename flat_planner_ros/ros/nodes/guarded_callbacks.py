@@ -72,9 +72,10 @@ class GuardedNode(Node):
         self, callback: Callable[..., Any], what: str, *, is_request: bool = False
     ) -> Callable[..., Any]:
         """Return a callback that raises nothing."""
+        # With its signature: a subscription may ask for more than the message.
+        copying = wraps(callback)
 
-        # Its signature, too: a subscription may ask for more than the message.
-        @wraps(callback)
+        @copying
         def call(*args: Any) -> Any:
             try:
                 return callback(*args)
