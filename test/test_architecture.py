@@ -39,7 +39,7 @@ WINGS = {
     'motion_law': 'arm',
     'insensitive': 'motion_law arm',
     'peak': 'motion_law arm',
-    'planning': 'motion_law insensitive arm',
+    'planning': 'motion_law insensitive peak arm',
     'session': 'planning arm',
     'plant': 'arm',
     'monitor': 'arm',

@@ -182,7 +182,7 @@ Square = Callable[[FlatMap, float, float], FloatArray]
 
 class Strategy(Enum):
     """
-    Named costs of the paper, one's own, and the trade of `insensitive`.
+    Named costs of the paper, one's own, the trade of `insensitive`, and the least peak.
 
     The cost is the integral of the squared sixth derivative and of the squares in the row. A new
     strategy is a row here and a `Square`, a function as the ones above, for what is new in it; the
@@ -204,6 +204,8 @@ class Strategy(Enum):
     CUSTOM = 'custom'
     # Shapes one joint's effort; the others, and starts in motion, have the polynomial law.
     INSENSITIVE = 'insensitive'
+    # The same, of least peak; it has a law of its own from starts in motion too.
+    MIN_PEAK_EFFORT = 'min_peak_effort'
 
     squares: tuple[Square, ...]
 

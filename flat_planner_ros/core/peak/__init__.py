@@ -17,14 +17,16 @@
 from flat_planner_ros.core.peak.bound import SwitchingFunction
 from flat_planner_ros.core.peak.law import LinearEffortLaw
 from flat_planner_ros.core.peak.motion import (
+    check_peak,
     peak_motion,
     peak_motion_from,
-    PeakMotion,
     shortest_peak_duration,
 )
+from flat_planner_ros.core.peak.problem import PeakMotion
 from flat_planner_ros.core.peak.settings import MAX_INTERVALS, MIN_INTERVALS, PeakSettings
 
 __all__ = [
+    'check_peak',
     'LinearEffortLaw',
     'MAX_INTERVALS',
     'MIN_INTERVALS',

@@ -36,9 +36,6 @@ MIN_GRID = 400
 NEWTON_STEPS = 3
 """Steps that square the distance of a switch to its place, from the chord's."""
 
-BISECTIONS = 50
-"""Halvings of an interval between two switches, down to rounding."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SwitchingFunction:
@@ -66,7 +63,7 @@ class SwitchingFunction:
         return values
 
     def area(self, left: FloatArray) -> FloatArray:
-        """Return an antiderivative."""
+        """Return an antiderivative, shape (m,), or () of a number."""
         swing, slope = self._amplitudes
         pole = self.mode.pole
         growth = np.exp(pole * left)
@@ -120,18 +117,15 @@ class SwitchingFunction:
             A duration in which it is met [s].
 
         """
+        from scipy.optimize import brentq
+
         edges = np.concatenate([[0.0], self.switches(longest), [longest]])
         reached = peak * np.append(0.0, np.cumsum(np.abs(np.diff(self.area(edges)))))
         last = int(np.searchsorted(reached, target))
         if last >= len(edges):
             return longest
         low, high = edges[last - 1], edges[last]
-        sought = (target - reached[last - 1]) / peak
-        from_area = self.area(np.array([low]))[0]
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            if abs(self.area(np.array([middle]))[0] - from_area) < sought:
-                low = middle
-            else:
-                high = middle
-        return float(low)
+        begin, end = (float(self.area(edge)) for edge in (low, high))
+        # Between two switches s has one sign.
+        sought = min((target - reached[last - 1]) / peak, abs(end - begin))
+        return float(brentq(lambda left: abs(float(self.area(left)) - begin) - sought, low, high))

@@ -194,6 +194,9 @@ class Plan:
         """
         Return the plan on an even grid that contains both ends.
 
+        The grid also contains the corners of an effort that is linear in pieces, so that the
+        samples, joined linearly, are that effort and nothing else.
+
         Parameters
         ----------
         period
@@ -201,6 +204,10 @@ class Plan:
 
         """
         intervals = max(1, ceil(self.duration / period - SPACING_TOLERANCE))
+        knots = self.trajectory.knots
+        if knots is not None:
+            pieces = len(knots) - 1
+            intervals = pieces * ceil(intervals / pieces)
         planned, driving_effort = self.trajectory.on_even_grid(intervals)
         return PlanSamples(
             times=even_times(self.duration, intervals),

@@ -30,6 +30,7 @@ from flat_planner_ros.core.planning.request import (
     RequestRejected,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+from flat_planner_ros.core.planning.strategies import shortest_at_rest
 
 REASONS = {
     Quantity.POSITION: Reason.POSITION_LIMIT,
@@ -135,26 +136,37 @@ class DurationRules:
         def plan_of(time: float) -> Plan:
             return plan(request.stretched(time), arm, options)
 
+        # Joint n-1 alone has an effort that a strategy may know how to bring to its limit.
+        limit = float(self.limits.effort[-2])
         if not is_prescribed:
-            return self._shortest(plan_of, self.shortest), None
+            bound = shortest_at_rest(request, arm, options, limit)
+            return self._shortest(plan_of, self.shortest, bound=bound), None
         prescribed = plan(request, arm, options)
         use = self.limits.worst(prescribed)
         if use is None or not use.is_exceeded:
             return prescribed, None
         scales = self.on_violation is OnViolation.SCALE
         # To stretch is to take longer, even if something shorter obeys as well.
-        found = self._shortest(plan_of, request.duration if scales else self.shortest, use)
+        shortest = request.duration if scales else self.shortest
+        bound = shortest_at_rest(request, arm, options, limit)
+        found = self._shortest(plan_of, shortest, use, bound)
         if scales:
             return found, use
         remedy = f'the shortest feasible duration is {found.duration:.9g} s'
         raise self._rejection(use, f'{self._sentence(use)}; {remedy}', found.duration)
 
     def _shortest(
-        self, plan_of: Callable[[float], Plan], shortest: float, exceeded: LimitUse | None = None
+        self,
+        plan_of: Callable[[float], Plan],
+        shortest: float,
+        exceeded: LimitUse | None = None,
+        bound: float | None = None,
     ) -> Plan:
         """Return the shortest plan, or reject by what a prescribed one, or the best, exceeds."""
         try:
-            return shortest_plan(plan_of, self.limits, shortest=shortest, longest=self.longest)
+            return shortest_plan(
+                plan_of, self.limits, shortest=shortest, longest=self.longest, bound=bound
+            )
         except NoFeasibleDuration as error:
             if error.at_end:
                 where = 'at the start' if error.use.time == 0.0 else 'at rest in the final pose'

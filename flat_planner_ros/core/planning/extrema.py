@@ -28,6 +28,7 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law import CONDITIONS
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
+from flat_planner_ros.core.planning.reference_trajectory import ReferenceTrajectory
 import numpy as np
 from numpy.typing import NDArray
 
@@ -169,9 +170,7 @@ def extrema_of(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> 
 
 def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     """Return series of all joints' quantities, in the order of quantities and joints."""
-    edges = np.array(plan.trajectory.edges)
-    fractions = np.array([0.0, 0.125, 0.5, 0.875])
-    bounds = np.append((edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel(), edges[-1])
+    bounds, orders = _first_bounds(plan.trajectory)
     starts, lengths = bounds[:-1], np.diff(bounds)
     scale, layer_scale = _Range(), _Range()
     done: list[tuple[FloatArray, FloatArray, FloatArray, BoolArray]] = []
@@ -181,7 +180,7 @@ def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
         samples = plan.at(times.ravel())
         shape = (-1, len(starts), DEGREE + 1)
         values = np.stack([quantity.of(samples).T for quantity in quantities])
-        layers = samples.planned[:, 1:CONDITIONS]
+        layers = samples.planned[:, 1:orders]
         noise = NOISE * np.abs(values).max(axis=(1, 2), keepdims=True)
         noise = np.broadcast_to(noise[..., 0], values.shape[:2]).reshape(-1, 1)
         values, layers = values.reshape(shape), layers.reshape(shape)
@@ -200,6 +199,17 @@ def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
         for parts, axis in zip(zip(*done, strict=True), (0, 0, 1, 0), strict=True)
     )
     return _Mesh(starts=starts, lengths=lengths, values=values, resolved=resolved)
+
+
+def _first_bounds(trajectory: ReferenceTrajectory) -> tuple[FloatArray, int]:
+    """Return times between which laws are smooth, and the number of continuous derivatives."""
+    if trajectory.knots is not None:
+        # The fifth derivative jumps where an effort has a corner.
+        return trajectory.knots, CONDITIONS - 1
+    edges = np.array(trajectory.edges)
+    fractions = np.array([0.0, 0.125, 0.5, 0.875])
+    inner = edges[:-1, None] + np.diff(edges)[:, None] * fractions
+    return np.append(inner.ravel(), edges[-1]), CONDITIONS
 
 
 class _Range:

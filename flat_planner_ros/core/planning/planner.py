@@ -19,6 +19,7 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import (
+    FlatModel,
     FloatArray,
     InvalidRequest,
     PlanarArm,
@@ -30,6 +31,7 @@ from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     ExponentialLaw,
     extremals,
+    Law,
     MAX_DERIVATIVE,
     optimal_path,
     PathConditions,
@@ -85,10 +87,8 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
         if request.via:
             found = _through_points(request, options, problem)
         elif request.start_jets is not None:
-            own = OWN_LAWS.get(options.strategy)
-            if own is not None:
-                options = replace(options, strategy=own.in_motion)
-            found = _from_motion(request, problem, request.start_jets)
+            options = _options_in_motion(options)
+            found = _from_motion(request, options, problem, request.start_jets)
         else:
             found = _from_rest(request, options, problem)
     except ArithmeticError as error:
@@ -101,6 +101,15 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
         boundary_residual=found.boundary_residual,
         optimality_residual=found.optimality_residual,
     )
+
+
+def _options_in_motion(options: PlanningOptions) -> PlanningOptions:
+    """Return the options with the strategy that can start in motion."""
+    own = OWN_LAWS.get(options.strategy)
+    # A running motion may have been planned with another flat map than the settings have now.
+    if own is None or (own.motion_from and options.flat_model is FlatModel.EXACT):
+        return options
+    return replace(options, strategy=own.in_motion)
 
 
 class _Certified(NamedTuple):
@@ -157,6 +166,7 @@ def _with_own_law(
         final=np.array(final),
         edges=(0.0, problem.duration),
         own_cost=motion.cost,
+        knots=motion.knots,
     )
     unit = problem.unit
     return _Certified(
@@ -166,29 +176,47 @@ def _with_own_law(
     )
 
 
-def _from_motion(request: MotionRequest, problem: MotionProblem, start: FloatArray) -> _Certified:
+def _from_motion(
+    request: MotionRequest, options: PlanningOptions, problem: MotionProblem, start: FloatArray
+) -> _Certified:
     """Return the trajectory whose planned variables have given derivatives at the start."""
     final = np.array(planned_at_rest(request.final))
     # Counted from the end, so that a distant place costs no digits of a short way.
     ways = start.copy()
     ways[:, 0] -= final
+    own = _own_from_motion(options, problem, start[0], final[0]) if ways[0].any() else None
     rest = np.zeros(CONDITIONS)
-    conditions = [BoundaryConditions(start=way, end=rest) for way in ways]
+    conditions = [BoundaryConditions(start=way, end=rest) for way in ways[own is not None :]]
     with strict_arithmetic():
-        laws = extremals(problem.cost.characteristic(), problem.duration, conditions)
-        pairs = zip(laws, ways, strict=True)
+        found = extremals(problem.cost.characteristic(), problem.duration, conditions)
+        pairs = zip(found, ways[own is not None :], strict=True)
         residuals = [_residuals(problem, law, way) for law, way in pairs if way.any()]
-        places = zip(laws, final.tolist(), strict=True)
-        shifted = tuple(law.transformed(1.0, place) for law, place in places)
+        places = zip(found, final[own is not None :].tolist(), strict=True)
+        laws: list[Law] = [law.transformed(1.0, place) for law, place in places]
+    if own is not None:
+        laws.insert(0, own.law)
+        residuals.append((own.boundary_residual, own.optimality_residual))
     boundary, optimality = np.max([(0.0, 0.0), *residuals], axis=0).tolist()
     trajectory = LawTrajectory(
         problem=problem,
-        laws=shifted,
+        laws=tuple(laws),
         start=start,
         final=final,
         edges=(0.0, problem.duration),
+        own_cost=None if own is None else own.cost,
+        knots=None if own is None else own.knots,
     )
     return _Certified(trajectory, boundary, optimality)
+
+
+def _own_from_motion(
+    options: PlanningOptions, problem: MotionProblem, start: FloatArray, final: float
+) -> OwnMotion | None:
+    """Return the strategy's own motion of the first planned variable, if it has one."""
+    own = OWN_LAWS.get(options.strategy)
+    if own is None or own.motion_from is None:
+        return None
+    return own.motion_from(problem.arm, options, problem.duration, start, final)
 
 
 def _residuals(

@@ -58,6 +58,9 @@ GRIDS_KEPT = 32
 MAX_KEPT_INTERVALS = 10_000
 """Longest grid that is kept; with `GRIDS_KEPT` it bounds the caches to 24 MB."""
 
+NODES_PER_PIECE = 8
+"""Gauss-Legendre nodes between two knots of an effort that is linear there."""
+
 _ORDERS = np.arange(JET_ORDER + 1.0)
 
 
@@ -200,6 +203,10 @@ class ReferenceTrajectory(Protocol):
         """Return the times from the start to the end between which the laws are smooth [s]."""
 
     @property
+    def knots(self) -> FloatArray | None:
+        """Return even times between which the laws are smooth, as `LawTrajectory.knots`."""
+
+    @property
     def cost_value(self) -> float:
         """Return the sum of their costs."""
 
@@ -247,6 +254,10 @@ class RestToRestTrajectory:
     def edges(self) -> tuple[float, ...]:
         """Return start and end of the motion [s]."""
         return 0.0, self.problem.duration
+
+    @property
+    def knots(self) -> None:
+        """Return that the laws are smooth throughout."""
 
     @property
     def cost_value(self) -> float:
@@ -308,6 +319,9 @@ class LawTrajectory:
         Times from the start to the end between which the laws are smooth [s].
     own_cost
         Cost of laws that minimise something other than the problem's; None where they do not.
+    knots
+        Even times between which laws with an effort linear in pieces are smooth, both ends
+        included, shape (m,) [s]; None for laws that are smooth between the edges.
 
     """
 
@@ -317,6 +331,7 @@ class LawTrajectory:
     final: FloatArray
     edges: tuple[float, ...]
     own_cost: float | None = None
+    knots: FloatArray | None = None
 
     @cached_property
     def cost_value(self) -> float:
@@ -347,6 +362,12 @@ class LawTrajectory:
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
+        if self.knots is not None:
+            nodes, shares = np.polynomial.legendre.leggauss(NODES_PER_PIECE)
+            lengths = np.diff(self.knots)
+            times = self.knots[:-1, None] + 0.5 * np.multiply.outer(lengths, nodes + 1.0)
+            weights = np.multiply.outer(lengths, shares) / (2.0 * self.problem.duration)
+            return times.ravel(), weights.ravel()
         places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
         travel = float(np.abs(np.diff(places)).sum())
         return motion_quadrature(self.problem.unit.law.rates, travel, self.edges)

@@ -29,6 +29,7 @@ from flat_planner_ros.core.arm import (
 )
 from flat_planner_ros.core.insensitive import Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
+from flat_planner_ros.core.peak import PeakSettings
 import numpy as np
 
 
@@ -152,6 +153,8 @@ class PlanningOptions:
         Whether the efforts include what the motors' friction takes, as the model has it.
     insensitivity
         Uncertainty of the model, and what the strategy `insensitive` makes of it.
+    peak
+        How steep, fast and robust the strategy `min_peak_effort` is.
     drive
         What moves joint n-1, on which depends what an arm other than the model does.
 
@@ -164,6 +167,7 @@ class PlanningOptions:
     flat_model: FlatModel = FlatModel.EXACT
     compensate_friction: bool = False
     insensitivity: Insensitivity = field(default_factory=Insensitivity)
+    peak: PeakSettings = field(default_factory=PeakSettings)
     drive: Drive = Drive.EFFORT
 
     def __post_init__(self) -> None:

@@ -124,7 +124,12 @@ class _Trial:
 
 
 def shortest_plan(
-    plan_of: Callable[[float], Plan], limits: JointLimits, *, shortest: float, longest: float
+    plan_of: Callable[[float], Plan],
+    limits: JointLimits,
+    *,
+    shortest: float,
+    longest: float,
+    bound: float | None = None,
 ) -> Plan:
     """
     Return the plan of the shortest duration that obeys the limits.
@@ -137,6 +142,8 @@ def shortest_plan(
         Limits of the joints.
     shortest, longest
         Range of the duration [s].
+    bound
+        A duration below which none obeys [s], as some strategies know it; it is tried first.
 
     Returns
     -------
@@ -156,7 +163,9 @@ def shortest_plan(
     """
     if not (0.0 < shortest <= longest and isfinite(longest)):
         raise InvalidRequest(f'no range of durations: {shortest:g} to {longest:g} s')
-    return _Search(plan_of, limits, shortest, longest).run()
+    if bound is None or not shortest < bound < longest:
+        return _Search(plan_of, limits, shortest, longest).run()
+    return _Search(plan_of, limits, float(f'{bound:.{DIGITS}g}'), longest, is_bound=True).run()
 
 
 @dataclass(eq=False)
@@ -167,11 +176,16 @@ class _Search:
     limits: JointLimits
     shortest: float
     longest: float
+    is_bound: bool = False
     trials: dict[float, _Trial] = field(default_factory=dict)
     failure: FlatPlannerError | None = None
 
     def run(self) -> Plan:
         """Return the shortest plan found."""
+        if self.is_bound:
+            trial = self._try(self.shortest)
+            if trial.obeys and trial.plan is not None:
+                return trial.plan
         if not self._bracket():
             self._scan(self.shortest, self.longest)
             self._refuse_if_none()
@@ -224,7 +238,8 @@ class _Search:
     def _bracket(self) -> bool:
         """Look for one duration that obeys above one that does not; tell if any obeys."""
         stride = FIRST_STRIDE
-        trial = self._try(sqrt(self.shortest * self.longest))
+        first = self.shortest if self.is_bound else sqrt(self.shortest * self.longest)
+        trial = self._try(first)
         descends = trial.obeys
         while trial.obeys == descends:
             here = trial.duration

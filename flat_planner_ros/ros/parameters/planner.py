@@ -26,6 +26,7 @@ from flat_planner_ros.core.session import SessionSettings, StartSource
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
+from flat_planner_ros.ros.parameters.peak import peak_of, PEAK_ROWS
 from flat_planner_ros.ros.parameters.row import (
     DOUBLES,
     InvalidParameter,
@@ -107,6 +108,7 @@ ROWS = [
     ),
     Row('weights.Q', DOUBLES, '', '36 numbers, row by row: the cost of the strategy custom'),
     *INSENSITIVITY_ROWS,
+    *PEAK_ROWS,
     Row(
         'flat_model',
         PlanningOptions.flat_model,
@@ -305,6 +307,7 @@ def build(values: Values) -> PlannerSettings:
 
     """
     joints, arm = arm_of(values)
+    limits = _limits(values, joints)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
         r=values['weights.r'],
@@ -313,6 +316,7 @@ def build(values: Values) -> PlannerSettings:
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
         insensitivity=insensitivity_of(values),
+        peak=peak_of(values, limits),
         drive=Drive(values['drive']),
     )
     # What admits no motion is refused here and not at the next goal.
@@ -325,7 +329,7 @@ def build(values: Values) -> PlannerSettings:
         default_duration=values['duration.default'],
         min_duration=values['duration.min'],
         max_duration=values['duration.max'],
-        limits=_limits(values, joints),
+        limits=limits,
         on_violation=OnViolation(values['limits.on_violation']),
         start_source=StartSource(values['start.source']),
         start_position=tuple(values.get('start.position', ())),

@@ -103,6 +103,11 @@ def test_dual_values_prove_what_no_motion_can_do(insensitive, best):
     assert motion.least_peak == pytest.approx(motion.target / integral, rel=1e-6)
     proven = motion.switching.shortest_duration(motion.target, LIMIT / pi, duration)
     assert 0.99 * best < proven < best * (1.0 + 1e-6)
+    for share in np.linspace(0.05, 0.95, 7):
+        least = motion.switching.shortest_duration(share * motion.target, LIMIT / pi, duration)
+        assert motion.switching.magnitude(least) * LIMIT / pi == pytest.approx(
+            share * motion.target, rel=1e-9
+        )
 
 
 def test_the_switching_function_weighs_every_motion_alike():
