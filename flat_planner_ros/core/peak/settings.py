@@ -19,8 +19,11 @@ from math import inf, isfinite
 
 from flat_planner_ros.core.arm import InvalidRequest
 
-MIN_INTERVALS, MAX_INTERVALS = 16, 256
-"""Range of the number of spline intervals of the effort."""
+MIN_INTERVALS = 16
+"""Fewest spline intervals of an effort: conditions and steps at both ends leave it room."""
+
+MAX_INTERVALS = 256
+"""Most of them: the time is then within 0.3 % of that of any effort, and hardly falls further."""
 
 
 @dataclass(frozen=True, kw_only=True)
