@@ -17,6 +17,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -49,8 +50,8 @@ class GraphWatch:
 
     Parameters
     ----------
-    node
-        Node that complains.
+    node, log
+        Node that complains, and where.
     sole
         Topics that may have one publisher.
     shared
@@ -65,12 +66,14 @@ class GraphWatch:
     def __init__(
         self,
         node: Node,
+        log: NodeLog,
         sole: Sequence[str],
         shared: Sequence[str] = (),
         *,
         is_listening: bool = False,
     ) -> None:
         self._node = node
+        self._log = log
         self._sole = [node.resolve_topic_name(topic) for topic in sole]
         self._shared = [node.resolve_topic_name(topic) for topic in shared]
         self._is_listening = is_listening
@@ -91,9 +94,7 @@ class GraphWatch:
         ]
         self._looks_to_excuse = max(0, self._looks_to_excuse - 1)
         if complaints:
-            self._node.get_logger().error(
-                f'{"; ".join(complaints)}: only one of them may run ({REMARK})'
-            )
+            self._log.error(f'{"; ".join(complaints)}: only one of them may run ({REMARK})')
 
     def _publishers(self, topic: str) -> list[str]:
         """Return the full names of the nodes that publish on a topic."""

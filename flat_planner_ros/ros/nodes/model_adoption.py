@@ -19,6 +19,7 @@ from collections.abc import Callable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import AdoptionRefused, ModelTuner
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import diagnostics, interfaces
@@ -32,8 +33,8 @@ class ModelAdoption:
 
     Parameters
     ----------
-    node
-        Node whose parameters are set.
+    node, log
+        Node whose parameters are set, and where it says what is ignored.
     settings
         Returns the settings in force.
     last_start
@@ -46,11 +47,13 @@ class ModelAdoption:
     def __init__(
         self,
         node: Node,
+        log: NodeLog,
         settings: Callable[[], PlannerSettings],
         last_start: Callable[[], float | None],
         announce: Callable[[DiagnosticStatus], None],
     ) -> None:
         self._node = node
+        self._log = log
         self._settings = settings
         self._last_start = last_start
         self._announce = announce
@@ -64,7 +67,7 @@ class ModelAdoption:
         try:
             estimate = diagnostics.reported_estimate(msg)
         except FlatPlannerError as error:
-            self._node.get_logger().warning(f'report ignored: {error}')
+            self._log.warning(f'report ignored: {error}')
             return
         if estimate is None:
             return
@@ -74,7 +77,7 @@ class ModelAdoption:
             try:
                 self._adopt()
             except AdoptionRefused as refusal:
-                self._node.get_logger().info(f'auto_tune: {refusal}')
+                self._log.info(f'auto_tune: {refusal}')
 
     def _on_adopt(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Adopt the last trustworthy estimate."""

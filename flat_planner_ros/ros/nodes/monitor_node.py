@@ -30,6 +30,7 @@ from flat_planner_ros.ros.nodes.early_loading import load_early, REPORTING
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
@@ -65,6 +66,7 @@ class MonitorNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(interfaces.MONITOR, **options)
+        self._log = NodeLog(self)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._monitor = VibrationMonitor(self._configuration.settings)
         self._forget()
@@ -90,7 +92,9 @@ class MonitorNode(GuardedNode):
         self.create_subscription(
             DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY
         )
-        self._watch = GraphWatch(self, [plan], [interfaces.JOINT_STATES], is_listening=True)
+        self._watch = GraphWatch(
+            self, self._log, [plan], [interfaces.JOINT_STATES], is_listening=True
+        )
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -130,7 +134,7 @@ class MonitorNode(GuardedNode):
         try:
             motion = conversions.planned_motion(conversions.points_of(data))
         except FlatPlannerError as error:
-            self.get_logger().warning(f'plan ignored: {error}')
+            self._log.warning(f'plan ignored: {error}')
             return
         if self._plan is None or self._plan.joint_names != motion.joint_names:
             self._forget()
@@ -151,14 +155,12 @@ class MonitorNode(GuardedNode):
                 self._take(sample, msg.header, self._reader.joints)
         except FlatPlannerError as error:
             self._watch.heard_other_part()
-            self.get_logger().warning(
-                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
-            )
+            self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
             return
         if self._reader.is_in_parts:
             self._watch.heard_other_part()
         for remark in self._reader.take_remarks():
-            self.get_logger().warning(remark)
+            self._log.warning(remark)
 
     def _take(self, sample: JointSample, header: Header, joints: Sequence[str]) -> None:
         """Take a sample and tell how far it is from the plan."""
@@ -180,7 +182,7 @@ class MonitorNode(GuardedNode):
                 if not result.successful:
                     raise InvalidParameter(result.reason)
         except FlatPlannerError as error:
-            self.get_logger().warning(f"the planner's model is not followed: {error}")
+            self._log.warning(f"the planner's model is not followed: {error}")
 
     def _on_tick(self) -> None:
         """Notice silence, unless the node itself has been busy: samples may be waiting then."""
@@ -199,7 +201,7 @@ class MonitorNode(GuardedNode):
     def _on_diagnostics(self) -> None:
         """Publish the present state, and say what was wrong since the last time."""
         for warning in self._monitor.take_warnings():
-            self.get_logger().warning(warning)
+            self._log.warning(warning)
         status = diagnostics.monitor_status(
             self._report, self._monitor.phase.value, self._monitor.dropped
         )
@@ -220,9 +222,9 @@ class MonitorNode(GuardedNode):
             self._reports.publish(diagnostics.array_of(status, self._stamps.now(self._now())))
             # One call for both would not do: a place in the code may log at one severity only.
             if status.level == DiagnosticStatus.OK:
-                self.get_logger().info(status.message)
+                self._log.info(status.message)
             else:
-                self.get_logger().warning(status.message)
+                self._log.warning(status.message)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -24,13 +24,15 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import Goal, PlannerSession
+from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
-from flat_planner_ros.ros.nodes.graph_watch import GraphWatch, unheard
+from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import planner_sentence
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
@@ -50,6 +52,7 @@ class PlannerNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(interfaces.PLANNER, **options)
+        self._log = NodeLog(self)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         self._reader = JointStateReader(self._joints, self._settings.joint_states)
@@ -62,25 +65,21 @@ class PlannerNode(GuardedNode):
         )
         self._efforts = EffortStream(self, efforts, self._session)
         self._adoption = ModelAdoption(
-            self, lambda: self._settings, lambda: self._sent_start, self._publish_status
+            self, self._log, lambda: self._settings, lambda: self._sent_start, self._publish_status
         )
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
         self.create_service(Trigger, interfaces.STOP, self._on_stop)
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
         commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
-        self._watch = GraphWatch(self, commands, [interfaces.JOINT_STATES], is_listening=True)
+        self._watch = GraphWatch(
+            self, self._log, commands, [interfaces.JOINT_STATES], is_listening=True
+        )
         self._apply(self._settings)
         load_early(self, PLANNING)
 
     def _open_publishers(self) -> None:
         """Offer commands, plans and verdicts."""
-        self._command = self.create_publisher(
-            JointTrajectory, interfaces.COMMAND, interfaces.RELIABLE
-        )
-        self._plan = self.create_publisher(JointTrajectory, interfaces.PLAN, interfaces.LATCHED)
-        self._flat_plan = self.create_publisher(
-            JointTrajectory, interfaces.FLAT_PLAN, interfaces.LATCHED
-        )
+        self._outlet = CommandOutlet(self)
         self._reference = self.create_publisher(
             JointState, interfaces.REFERENCE, interfaces.RELIABLE
         )
@@ -146,14 +145,12 @@ class PlannerNode(GuardedNode):
                 self._session.measure(sample)
         except FlatPlannerError as error:
             self._watch.heard_other_part()
-            self.get_logger().warning(
-                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
-            )
+            self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
         if self._reader.is_in_parts:
             self._watch.heard_other_part()
             self._session.lack = self._reader.lack
         for remark in self._reader.take_remarks():
-            self.get_logger().warning(remark)
+            self._log.warning(remark)
         self._goals.answer_due()
 
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -180,7 +177,7 @@ class PlannerNode(GuardedNode):
         response.message = (
             f'plan {motion.plan_id} comes to rest {motion.end - self._now():.3f} s from now'
         )
-        self.get_logger().info(response.message)
+        self._log.info(response.message)
         self._report_ended()
         return response
 
@@ -197,16 +194,8 @@ class PlannerNode(GuardedNode):
         for astray in self._session.take_astray():
             self._publish_status(diagnostics.astray_status(astray))
         for ended in self._session.take_ended(self._now()):
-            remark = '' if ended.shortfall is None else self._doubt()
+            remark = '' if ended.shortfall is None else self._outlet.doubt(self._settings)
             self._publish_status(diagnostics.ended_status(ended, remark))
-
-    def _doubt(self) -> str:
-        """Return that nobody hears the commands, a clause; empty if somebody does."""
-        settings = self._settings
-        if not settings.session.execute:
-            return ''
-        streams = [interfaces.EFFORT_COMMANDS] if settings.stream_effort else []
-        return unheard(self, interfaces.COMMAND, *streams)
 
     def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
         """Give a goal exactly one verdict; carry it out if it is accepted."""
@@ -218,7 +207,7 @@ class PlannerNode(GuardedNode):
         except RequestRejected as error:
             status = diagnostics.rejected_status(error, goal)
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
-            self.get_logger().error(f'internal error: {error!r}')
+            self._log.error(f'internal error: {error!r}')
             rejection = RequestRejected(Reason.INTERNAL, f'internal error: {error!r}')
             status = diagnostics.rejected_status(rejection, goal)
         else:
@@ -232,43 +221,27 @@ class PlannerNode(GuardedNode):
                 elapsed,
                 with_advice=self._settings.report_advice,
                 with_baselines=self._settings.report_baselines,
-                doubt=self._doubt(),
+                doubt=self._outlet.doubt(self._settings),
             )
         self._publish_status(status)
         self._report_ended()
         return status
 
     def _publish_motion(self) -> None:
-        """Publish all that is still to be carried out, the command first: its start is near."""
-        settings = self._settings
+        """Publish all that is still to be carried out."""
         track = self._session.track(self._now())
         self._sent_start = track.start
-        plan = conversions.command_bytes(track, self._joints)
-        if settings.session.execute:
-            is_whole = settings.include_passive_joint and settings.include_effort
-            command = plan
-            if not (is_whole and settings.session.is_stamped):
-                command = conversions.command_bytes(
-                    track,
-                    self._joints,
-                    include_passive_joint=settings.include_passive_joint,
-                    include_effort=settings.include_effort,
-                    absolute_stamp=settings.session.is_stamped,
-                )
-            self._command.publish(command)
-        self._plan.publish(plan)
-        self._flat_plan.publish(conversions.flat_plan_bytes(track))
+        self._outlet.publish(track, self._settings)
 
     def _publish_status(self, status: DiagnosticStatus) -> None:
         """Publish and log a verdict."""
         self._status.publish(diagnostics.array_of(status, self._now()))
-        # A call for each: a logger refuses another severity from the same line.
-        if status.level == DiagnosticStatus.OK:
-            self.get_logger().info(status.message)
-        elif status.level == DiagnosticStatus.WARN:
-            self.get_logger().warning(status.message)
-        else:
-            self.get_logger().error(status.message)
+        say = {
+            DiagnosticStatus.OK: self._log.info,
+            DiagnosticStatus.WARN: self._log.warning,
+            DiagnosticStatus.ERROR: self._log.error,
+        }
+        say[status.level](status.message)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -23,6 +23,7 @@ from flat_planner_ros.core.plant import ArmState, PacedArm
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
@@ -48,6 +49,7 @@ class PlantNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(interfaces.PLANT, **options)
+        self._log = NodeLog(self)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         settings = self._settings
         if settings.publish_clock and self.get_parameter('use_sim_time').value:
@@ -100,7 +102,7 @@ class PlantNode(GuardedNode):
         raw = callback == self._on_trajectory
         self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)
         clock = [interfaces.CLOCK] if self._settings.publish_clock else []
-        GraphWatch(self, [name, *clock], [interfaces.JOINT_STATES])
+        GraphWatch(self, self._log, [name, *clock], [interfaces.JOINT_STATES])
 
     def _apply(self, settings: PlantSettings) -> None:
         """Go on with another mismatch or other sensors."""
@@ -121,10 +123,10 @@ class PlantNode(GuardedNode):
             profile = conversions.effort_profile(points, joints, self._arm.time, drive)
             remark = self._arm.command(profile)
         except FlatPlannerError as error:
-            self.get_logger().warning(f'trajectory ignored: {error}')
+            self._log.warning(f'trajectory ignored: {error}')
             return
         if remark:
-            self.get_logger().warning(f'trajectory accepted, but {remark}')
+            self._log.warning(f'trajectory accepted, but {remark}')
 
     def _on_effort(self, msg: Float64MultiArray) -> None:
         """Apply efforts until the next ones."""
@@ -132,9 +134,7 @@ class PlantNode(GuardedNode):
         try:
             self._arm.hold(msg.data)
         except FlatPlannerError as error:
-            self.get_logger().warning(
-                f'effort ignored: {error}', throttle_duration_sec=WARNING_PERIOD
-            )
+            self._log.warning(f'effort ignored: {error}', WARNING_PERIOD)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Bring the arm back to rest where it started."""
@@ -171,7 +171,7 @@ class PlantNode(GuardedNode):
     def _on_watch(self) -> None:
         """Say what went wrong, with numbers, at most once per period."""
         for warning in self._arm.take_warnings():
-            self.get_logger().warning(warning)
+            self._log.warning(warning)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -23,6 +23,7 @@ from flat_planner_ros.core.tracking import Tracker
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.tracker import build, ROWS
@@ -51,6 +52,7 @@ class TrackerNode(GuardedNode):
     def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.TRACKER, **options)
+        self._log = NodeLog(self)
         # Everything is fixed at the start: other gains are for an arm that is let go.
         settings = NodeParameters(self, ROWS, build, lambda _: None).settings
         self._joints = settings.joints
@@ -63,14 +65,14 @@ class TrackerNode(GuardedNode):
         # As bytes: the points of a long command would take a second to become Python objects.
         listen(JointTrajectory, command, self._on_command, interfaces.RELIABLE, raw=True)
         listen(JointState, states, self._on_measured, interfaces.SENSOR_DATA)
-        self._watch = GraphWatch(self, [efforts, command], [states], is_listening=True)
+        self._watch = GraphWatch(self, self._log, [efforts, command], [states], is_listening=True)
         self.create_service(Trigger, interfaces.RELEASE, self._on_release)
         # A simulated clock can stand still; the effort must not hang on it.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looked = stamps.now(self._steady)
         self._look_period = settings.tracker.timeout / LOOKS
         self.create_timer(self._look_period, self._on_look, clock=self._steady)
-        self.get_logger().info(f'certified: {self._tracker.certificate.sentence}')
+        self._log.info(f'certified: {self._tracker.certificate.sentence}')
 
     @property
     def introduction(self) -> str:
@@ -95,7 +97,7 @@ class TrackerNode(GuardedNode):
             points = conversions.points_of(data)
             self._tracker.follow(tracked_motion(points, self._joints, now), now)
         except FlatPlannerError as error:
-            self.get_logger().warning(f'command ignored: {error}')
+            self._log.warning(f'command ignored: {error}')
 
     def _on_measured(self, msg: JointState) -> None:
         """Answer the samples that a message completes with efforts."""
@@ -103,14 +105,12 @@ class TrackerNode(GuardedNode):
             samples = self._reader.read(msg, self._now)
         except FlatPlannerError as error:
             self._watch.heard_other_part()
-            self.get_logger().warning(
-                f'joint state ignored: {error}', throttle_duration_sec=WARNING_PERIOD
-            )
+            self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
             return
         if self._reader.is_in_parts:
             self._watch.heard_other_part()
         for remark in self._reader.take_remarks():
-            self.get_logger().warning(remark)
+            self._log.warning(remark)
         for sample in samples:
             self._send(self._tracker.hear(sample, max(self._now(), sample.time)))
 
@@ -133,7 +133,7 @@ class TrackerNode(GuardedNode):
             self._efforts.publish(conversions.effort_msg(efforts))
         fault = self._tracker.take_fault()
         if fault:
-            self.get_logger().error(fault)
+            self._log.error(fault)
 
 
 def main(args: Sequence[str] | None = None) -> int:

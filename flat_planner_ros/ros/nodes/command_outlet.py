@@ -1,0 +1,69 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Outlet of commands and plans: what is to be carried out, as executors and viewers take it."""
+
+from flat_planner_ros.core.session import Track
+from flat_planner_ros.ros.nodes.graph_watch import unheard
+from flat_planner_ros.ros.parameters.planner import PlannerSettings
+from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire.message_types import message_class
+from rclpy.node import Node
+
+JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+
+
+class CommandOutlet:
+    """
+    Publishes commands, plans and flat plans.
+
+    Parameters
+    ----------
+    node
+        Node that plans.
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        kind = message_class(JOINT_TRAJECTORY)
+        self._command = node.create_publisher(kind, interfaces.COMMAND, interfaces.RELIABLE)
+        self._plan = node.create_publisher(kind, interfaces.PLAN, interfaces.LATCHED)
+        self._flat_plan = node.create_publisher(kind, interfaces.FLAT_PLAN, interfaces.LATCHED)
+
+    def publish(self, track: Track, settings: PlannerSettings) -> None:
+        """Publish what is to be carried out, the command first: its start is near."""
+        joints = settings.session.joints
+        plan = conversions.command_bytes(track, joints)
+        if settings.session.execute:
+            is_whole = settings.include_passive_joint and settings.include_effort
+            command = plan
+            if not (is_whole and settings.session.is_stamped):
+                command = conversions.command_bytes(
+                    track,
+                    joints,
+                    include_passive_joint=settings.include_passive_joint,
+                    include_effort=settings.include_effort,
+                    absolute_stamp=settings.session.is_stamped,
+                )
+            self._command.publish(command)
+        self._plan.publish(plan)
+        self._flat_plan.publish(conversions.flat_plan_bytes(track))
+
+    def doubt(self, settings: PlannerSettings) -> str:
+        """Return that nobody hears the commands, a clause; empty if somebody does or need not."""
+        if not settings.session.execute:
+            return ''
+        streams = [interfaces.EFFORT_COMMANDS] if settings.stream_effort else []
+        return unheard(self._node, interfaces.COMMAND, *streams)
