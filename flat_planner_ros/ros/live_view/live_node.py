@@ -195,7 +195,7 @@ class LiveNode(GuardedNode):
                     self._last[stream] = now
                     self._show(stream, sample)
         for remark in reader.take_remarks():
-            self.get_logger().warning(remark)
+            self._log.warning(remark)
 
     def _show(self, stream: str, sample: JointSample) -> None:
         """Add a row: time, positions, velocities and efforts, NaN where unknown."""

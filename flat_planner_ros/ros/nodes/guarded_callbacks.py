@@ -28,6 +28,7 @@ from pathlib import Path
 import traceback
 from typing import Any
 
+from flat_planner_ros.ros.nodes.node_log import NodeLog
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
@@ -35,12 +36,13 @@ from rclpy.node import Node
 LIBRARY = 'rclpy.'
 """Begin of the names of the modules whose callbacks are not ours."""
 
-REPEAT_PERIOD = 1.0
-"""Shortest time between two lines about callbacks that fail again and again [s]."""
-
 
 class GuardedNode(Node):
-    """A node that no message, no request and no error in a callback ends."""
+    """A node that no message, no request and no error in a callback ends, nor a full console."""
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
+        self._log = NodeLog(self)
 
     def rest(self) -> None:
         """Bring the effort that this node gives to zero, after an error of its own."""
@@ -91,21 +93,15 @@ class GuardedNode(Node):
         """Say what is lost, and let the arm come to rest if the error is ours."""
         text = f'{what} is lost: {error!r}'
         if not is_ours:
-            self.get_logger().warning(text)
+            self._log.warning(text)
             return
         place = traceback.extract_tb(error.__traceback__)[-1]
-        self.get_logger().error(
-            f'internal error, {text} ({Path(place.filename).name}:{place.lineno})',
-            throttle_duration_sec=REPEAT_PERIOD,
-        )
+        self._log.error(f'internal error, {text} ({Path(place.filename).name}:{place.lineno})')
         self.get_logger().debug(''.join(traceback.format_exception(error)))
         try:
             self.rest()
         except Exception as failure:  # noqa: BLE001  As above.
-            self.get_logger().error(
-                f'internal error, the effort may not be zero: {failure!r}',
-                throttle_duration_sec=REPEAT_PERIOD,
-            )
+            self._log.error(f'internal error, the effort may not be zero: {failure!r}')
 
 
 def _is_of_library(callback: Callable[..., Any]) -> bool:

@@ -30,7 +30,6 @@ from flat_planner_ros.ros.nodes.early_loading import load_early, REPORTING
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
-from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
@@ -66,7 +65,6 @@ class MonitorNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(interfaces.MONITOR, **options)
-        self._log = NodeLog(self)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._monitor = VibrationMonitor(self._configuration.settings)
         self._forget()

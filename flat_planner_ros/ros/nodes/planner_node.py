@@ -32,7 +32,6 @@ from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import planner_sentence
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
-from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
@@ -52,7 +51,6 @@ class PlannerNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(interfaces.PLANNER, **options)
-        self._log = NodeLog(self)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         self._reader = JointStateReader(self._joints, self._settings.joint_states)

@@ -23,7 +23,6 @@ from flat_planner_ros.core.plant import ArmState, PacedArm
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
-from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
@@ -49,7 +48,6 @@ class PlantNode(GuardedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(interfaces.PLANT, **options)
-        self._log = NodeLog(self)
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         settings = self._settings
         if settings.publish_clock and self.get_parameter('use_sim_time').value:

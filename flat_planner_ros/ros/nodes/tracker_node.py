@@ -23,7 +23,6 @@ from flat_planner_ros.core.tracking import Tracker
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
-from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.tracker import build, ROWS
@@ -52,7 +51,6 @@ class TrackerNode(GuardedNode):
     def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.TRACKER, **options)
-        self._log = NodeLog(self)
         # Everything is fixed at the start: other gains are for an arm that is let go.
         settings = NodeParameters(self, ROWS, build, lambda _: None).settings
         self._joints = settings.joints

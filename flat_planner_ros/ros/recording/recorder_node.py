@@ -200,7 +200,7 @@ class RecorderNode(GuardedNode):
         def write(message: bytes) -> None:
             if is_measured and not any(message[STAMP]) and not self._said_unstamped:
                 self._said_unstamped = True
-                self.get_logger().warning(f'{NO_STAMP} from the recording')
+                self._log.warning(f'{NO_STAMP} from the recording')
             if not self._writer.knows(topic):
                 infos = self.get_publishers_info_by_topic(topic)
                 offered = [info.qos_profile for info in infos] or [quality]
@@ -217,7 +217,7 @@ class RecorderNode(GuardedNode):
     def _refuse(self, topic: str, reason: str) -> None:
         """Leave a topic out, saying so once."""
         self._refused.add(topic)
-        self.get_logger().warning(f'{topic} is not recorded: {reason}')
+        self._log.warning(f'{topic} is not recorded: {reason}')
 
     async def _note_parameters(self, node: str) -> None:
         """Write down all parameters of one of our nodes."""
