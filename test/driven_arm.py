@@ -65,8 +65,9 @@ def sampled(times, positions, at):
 
 def reports_on(monitor, motion, stamps, positions, arrivals=None):
     """Return the reports of a monitor that is fed with these samples."""
-    reports = list(monitor.watch(motion))
+    reports = list(monitor.watch(motion, None if arrivals is None else START - 0.2))
     for index, (time, row) in enumerate(zip(stamps.tolist(), positions, strict=True)):
-        known = {} if arrivals is None else {'arrival': float(arrivals[index])}
-        reports += monitor.add(JointSample(time=time, positions=row), **known)
+        if arrivals is not None:
+            monitor.hear(time, float(arrivals[index]))
+        reports += monitor.add(JointSample(time=time, positions=row))
     return reports

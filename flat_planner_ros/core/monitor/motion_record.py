@@ -15,7 +15,7 @@
 """What a monitor is told: the planned motion, the measured samples, and their bounded record."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -92,6 +92,10 @@ class PlannedMotion:
         """Return the last positions [rad], shape (n,)."""
         final: FloatArray = self.positions[-1]
         return final
+
+    def shifted(self, delay: float) -> 'PlannedMotion':
+        """Return the motion with another start, later by a delay [s]."""
+        return replace(self, start=self.start + delay) if delay else self
 
     def is_same(self, other: 'PlannedMotion') -> bool:
         """Return whether the other motion is this one, received again."""
@@ -185,6 +189,10 @@ class Record:
         self._count += 1
         self._skip = self._stride - 1
 
+    def shift(self, delay: float) -> None:
+        """Set all times later [s]."""
+        self._table[: self._count, 0] += delay
+
     def between(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
         """Return copies of the times [s], shape (m,), and rows, shape (m, width), in between."""
         table = self._table[: self._count]
@@ -220,10 +228,18 @@ class Measured:
         record = self._after if is_after else self._during
         record.append(time, positions)
 
+    def shift(self, delay: float) -> None:
+        """Set all times later [s]."""
+        for record in (self.efforts, self._during, self._after):
+            record.shift(delay)
+
     def positions(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
         """Return times [s], shape (m,), and positions [rad], shape (m, n), in between."""
         parts = [record.between(start, end) for record in (self._during, self._after)]
-        return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+        times = np.concatenate([part[0] for part in parts])
+        rows = np.concatenate([part[1] for part in parts])
+        order = np.argsort(times, kind='stable')
+        return times[order], rows[order]
 
 
 def joint_indices(names: Sequence[str], wanted: Sequence[str]) -> NDArray[np.intp]:

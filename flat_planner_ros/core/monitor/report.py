@@ -24,6 +24,7 @@ from flat_planner_ros.core.monitor.identification import identify, StiffnessEsti
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
+from flat_planner_ros.core.monitor.stamp_offset import SampleClock
 import numpy as np
 
 EFFORT_GAP = 0.1
@@ -71,6 +72,9 @@ class VibrationReport:
         Stiffness and damping of the passive joint, ``None`` without a model to compare with.
     course
         How the motion was carried out, ``None`` if too little of it was seen.
+    clock_offset
+        By how much the stamps of the samples were ahead of the plan's clock [s], ``None`` if they
+        were not.
 
     """
 
@@ -90,6 +94,7 @@ class VibrationReport:
     samples: int
     estimate: StiffnessEstimate | None = None
     course: Course | None = None
+    clock_offset: float | None = None
 
     @property
     def is_settled(self) -> bool:
@@ -106,8 +111,9 @@ def assess(
     settings: MonitorSettings,
     measured: Measured,
     until: float,
-    cause: str = '',
+    clock: SampleClock,
     *,
+    cause: str = '',
     stale: bool = False,
 ) -> VibrationReport:
     """
@@ -123,6 +129,8 @@ def assess(
         What was measured from the start of the motion on.
     until
         Time at which the window is cut at the latest [s].
+    clock
+        Of the samples.
     cause
         Why it is cut, if it is.
     stale
@@ -137,12 +145,14 @@ def assess(
     until = min(until, motion.end + settings.window)
     course = compare(motion, *measured.positions(motion.start, until))
     # All that follows is about the time at which the arm did it, not about what was planned.
-    done = motion if course is None or not course.remark else course.carried_out(motion)
+    done = clock.carried_out(motion, course)
     times, rows = measured.positions(done.end, until)
     errors = rows - motion.final
-    fit = fit_oscillation(times, errors[:, -1], done.end)
-    if course is not None and course.is_in_degrees:
-        fit = OscillationFit(samples=times.size, reason='the unit of the joint states is doubtful')
+    doubt = _doubt(course, clock)
+    if doubt:
+        fit = OscillationFit(samples=times.size, reason=doubt)
+    else:
+        fit = fit_oscillation(times, errors[:, -1], done.end)
     estimate = _estimate(times - done.end, errors, fit, settings)
     frequency = fit.frequency or settings.expected_frequency
     settling = _settling_time(times - done.end, errors[:, -1], settings.settling_band, frequency)
@@ -150,7 +160,7 @@ def assess(
     period = 1.0 / frequency if frequency else window
     final_error = _time_mean(times, errors, done.end + window - period)
     missed = _missed(final_error, fit, is_whole=window >= WHOLE_PERIOD * period)
-    arrival = judge_arrival(motion, missed, course, settings)
+    arrival = judge_arrival(motion, missed, clock.own(course), settings)
     rms = tuple(
         _rms_effort(*measured.efforts.between(done.start, done.end), joint, done)
         for joint in range(len(motion.joint_names))
@@ -169,7 +179,7 @@ def assess(
             _effort_remark(motion.joint_names, rms),
             _estimate_remark(estimate, fit),
         )
-    sentence = (arrival.remark, _verdict(fit, settings), *remarks)
+    sentence = (clock.remark(course), arrival.remark, _verdict(fit, settings), *remarks)
     return VibrationReport(
         level=Level.STALE if stale else Level.worst((arrival.level, _level(fit, settings))),
         message='; '.join(filter(None, sentence)),
@@ -187,7 +197,17 @@ def assess(
         samples=times.size,
         estimate=estimate,
         course=course,
+        clock_offset=clock.ahead(course) if clock.is_other(course) else None,
     )
+
+
+def _doubt(course: Course | None, clock: SampleClock) -> str:
+    """Return why no number can be had of what is left, if so."""
+    if course is not None and course.is_in_degrees:
+        return 'the unit of the joint states is doubtful'
+    if clock.is_doubtful(course):
+        return 'the motion does not show when it ended by the clock of the joint states'
+    return ''
 
 
 def _estimate(

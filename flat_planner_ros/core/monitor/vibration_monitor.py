@@ -14,6 +14,7 @@
 
 """Monitor of the oscillation after planned motions, fed with times and samples."""
 
+from dataclasses import replace
 from enum import Enum
 from math import inf, isfinite, nan
 
@@ -22,7 +23,11 @@ from flat_planner_ros.core.monitor.course import DEGREES
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.report import assess, VibrationReport
 from flat_planner_ros.core.monitor.settings import MonitorSettings
+from flat_planner_ros.core.monitor.stamp_offset import is_noticed, OffsetFilter, SampleClock
 import numpy as np
+
+SAME_CLOCK = 3600.0
+"""Time before its start within which a plan that arrives is of the node's own clock [s]."""
 
 
 class Phase(Enum):
@@ -75,6 +80,10 @@ class VibrationMonitor:
         self._set_back = 0.0
         self._reports: list[VibrationReport] = []
         self._measured = Measured(0)
+        self._offset = OffsetFilter()
+        self._correction = 0.0
+        self._is_own_clock = False
+        self._is_in_time = False
 
     @property
     def phase(self) -> Phase:
@@ -85,6 +94,11 @@ class VibrationMonitor:
     def motion(self) -> PlannedMotion | None:
         """Return the motion that started last."""
         return self._motion
+
+    @property
+    def clock_offset(self) -> float | None:
+        """Return by how much stamps are ahead of their arrival [s], None if nobody has told."""
+        return self._offset.offset
 
     @property
     def dropped(self) -> int:
@@ -106,7 +120,24 @@ class VibrationMonitor:
         self._set_back = 0.0
         return warnings
 
-    def watch(self, motion: PlannedMotion) -> list[VibrationReport]:
+    def hear(self, stamp: float, arrival: float) -> None:
+        """
+        Learn how stamps and time agree; to be told before the sample is added.
+
+        Parameters
+        ----------
+        stamp
+            Of a message with joint states [s].
+        arrival
+            When it came, by the clock of the plans [s].
+
+        """
+        self._offset.hear(stamp, arrival)
+        if self._is_in_time and not self._is_watching():
+            offset = self._offset.offset or 0.0
+            self._correct_by(-offset if is_noticed(offset) else 0.0)
+
+    def watch(self, motion: PlannedMotion, arrival: float | None = None) -> list[VibrationReport]:
         """
         Take a planned motion, to be watched from its start.
 
@@ -114,6 +145,9 @@ class VibrationMonitor:
         ----------
         motion
             The motion; without effect if it is the present or the waiting one again.
+        arrival
+            When it came [s]. A plan that came while it could still be judged is of the clock by
+            which it came; stamps of samples may be of another one.
 
         Returns
         -------
@@ -125,6 +159,10 @@ class VibrationMonitor:
         if any(other is not None and other.is_same(motion) for other in known):
             return []
         self._pending = motion
+        last = motion.end + self.settings.window
+        self._is_own_clock = arrival is not None and motion.start - SAME_CLOCK < arrival < last
+        # Late ones come by a slow transport, as the samples may, or to a monitor that came late.
+        self._is_in_time = self._is_own_clock and arrival is not None and arrival <= motion.start
         self._start_pending(self._now)
         return self._take_reports()
 
@@ -148,6 +186,8 @@ class VibrationMonitor:
             If the number of joints is not the motion's. No report is lost: the next call has it.
 
         """
+        if self._correction:
+            sample = replace(sample, time=sample.time + self._correction)
         time, positions = sample.time, sample.positions
         if time < self._last_sample - self.settings.timeout:
             self._reset_by(self._last_sample - time)
@@ -193,6 +233,7 @@ class VibrationMonitor:
             Stale report on a motion whose samples stopped, or report on one cut short.
 
         """
+        now += self._correction
         if now < self._now - self.settings.timeout:
             self._reset_by(self._now - now)
         self._advance(now)
@@ -221,7 +262,7 @@ class VibrationMonitor:
         if self._motion is None:
             return None
         _check_size(sample, self._motion)
-        position, velocity = self._motion.reference(sample.time)
+        position, velocity = self._motion.reference(sample.time + self._correction)
         return Residual(
             sample.positions - position,
             None if sample.velocities is None else sample.velocities - velocity,
@@ -247,6 +288,16 @@ class VibrationMonitor:
         """Start again after a step back in time [s]."""
         self.reset()
         self._set_back = step
+
+    def _correct_by(self, correction: float) -> None:
+        """Add a time to all stamps, those heard included [s]."""
+        step = correction - self._correction
+        self._correction = correction
+        self._now += step
+        self._last_sample += step
+        self._heard += step
+        if step:
+            self._last = None
 
     def _is_watching(self) -> bool:
         """Return whether a motion has started and has no report yet."""
@@ -280,10 +331,35 @@ class VibrationMonitor:
 
     def _close(self, until: float, cause: str = '', *, stale: bool = False) -> None:
         """End the watch of the present motion and judge it on the samples before `until`."""
+        if self._motion is None:
+            return
+        report = self._assessed(self._motion, until, cause, stale=stale)
+        if self._correction > 0.0 and not _shows_motion(report):
+            # Stamps that seemed behind were right perhaps, and the transport slow.
+            until -= self._correction
+            self._measured.shift(-self._correction)
+            self._correct_by(0.0)
+            if not (stale or cause):
+                return
+            report = self._assessed(self._motion, until, cause, stale=stale)
         self._phase = Phase.DONE
-        if self._motion is not None:
-            report = assess(self._motion, self.settings, self._measured, until, cause, stale=stale)
-            self._reports.append(report)
+        self._reports.append(report)
+
+    def _assessed(
+        self, motion: PlannedMotion, until: float, cause: str, *, stale: bool
+    ) -> VibrationReport:
+        """Return what is to be said of a motion by the samples before `until`."""
+        offset = self._offset.offset if self._is_own_clock else None
+        clock = SampleClock(offset, self._correction)
+        return assess(
+            motion, self.settings, self._measured, until, clock, cause=cause, stale=stale
+        )
+
+
+def _shows_motion(report: VibrationReport) -> bool:
+    """Return whether the motion is seen about when it was planned."""
+    course = report.course
+    return course is not None and course.shift is not None and not course.is_late
 
 
 def _check_size(sample: JointSample, motion: PlannedMotion) -> None:

@@ -142,12 +142,16 @@ class MonitorNode(GuardedNode):
         if self._reader is not None:
             self._reader.align(motion.positions[0])
         self._plan = motion
-        self._publish_reports(self._monitor.watch(motion))
+        self._publish_reports(self._monitor.watch(motion, self._now()))
 
     def _on_measured(self, msg: JointState) -> None:
         """Take what a message completes."""
         if self._reader is None:
             return
+        now = self._now()
+        # A simulated clock shows 0 until it is first heard.
+        if now and stamps.is_stamped(msg):
+            self._monitor.hear(stamps.seconds(msg.header.stamp), now)
         try:
             for sample in self._reader.read(msg, self._now):
                 self._take(sample, msg.header, self._reader.joints)
@@ -201,7 +205,10 @@ class MonitorNode(GuardedNode):
         for warning in self._monitor.take_warnings():
             self._log.warning(warning)
         status = diagnostics.monitor_status(
-            self._report, self._monitor.phase.value, self._monitor.dropped
+            self._report,
+            self._monitor.phase.value,
+            self._monitor.dropped,
+            self._monitor.clock_offset,
         )
         self._health.publish(diagnostics.array_of(status, self._now()))
 

@@ -209,12 +209,14 @@ class _Player:
             self._samples.clear()
         self._reader.align(motion.positions[0])
         self._motions.append(motion)
-        self._keep(self.monitor.watch(motion))
+        self._keep(self.monitor.watch(motion, arrival))
 
     def _take_state(self, msg: Any, arrival: float) -> None:
         """Take a joint state that arrived then [s]."""
         if self._reader is None:
             return
+        if stamps.is_stamped(msg):
+            self.monitor.hear(stamps.seconds(msg.header.stamp), arrival)
         for sample in self._reader.read(msg, lambda: arrival):
             self._stamp = sample.time
             self._samples.append(sample)
@@ -227,19 +229,23 @@ class _Player:
         for report in reports:
             motion = next(m for m in reversed(self._motions) if m.start == report.start_time)
             self.judgements.append(self._judgement(report, motion))
+            ahead = report.clock_offset or 0.0
             # The next motion needs what came since this one began, at most.
-            self._samples = [sample for sample in self._samples if sample.time >= motion.start]
+            self._samples = [
+                sample for sample in self._samples if sample.time - ahead >= motion.start
+            ]
 
     def _judgement(self, report: VibrationReport, motion: PlannedMotion) -> Judgement:
         """Return a report with its motion and the samples around it."""
+        ahead = report.clock_offset or 0.0
         first = motion.start - SHOWN_BEFORE * (motion.end - motion.start)
         last = motion.end + self.monitor.settings.window
-        shown = [sample for sample in self._samples if first <= sample.time <= last]
+        shown = [sample for sample in self._samples if first <= sample.time - ahead <= last]
         unknown = np.full(len(motion.joint_names), np.nan)
         return Judgement(
             report=report,
             motion=motion,
-            times=np.array([sample.time for sample in shown]),
+            times=np.array([sample.time - ahead for sample in shown]),
             positions=np.array([sample.positions for sample in shown]),
             efforts=np.array([unknown if s.efforts is None else s.efforts for s in shown]),
         )

@@ -262,7 +262,9 @@ def report_status(report: VibrationReport) -> DiagnosticStatus:
     return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _report_values(report))
 
 
-def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> DiagnosticStatus:
+def monitor_status(
+    report: VibrationReport | None, phase: str, dropped: int, clock_offset: float | None = None
+) -> DiagnosticStatus:
     """
     Return the present state of a monitor.
 
@@ -274,9 +276,15 @@ def monitor_status(report: VibrationReport | None, phase: str, dropped: int) -> 
         Event that the monitor is waiting for.
     dropped
         Number of unusable samples [-].
+    clock_offset
+        By how much the stamps of joint states are ahead of their arrival [s], ``None`` if unknown.
 
     """
-    state: Values = {'phase': phase, 'dropped_samples': dropped}
+    state: Values = {
+        'phase': phase,
+        'dropped_samples': dropped,
+        'stamp_minus_arrival': clock_offset,
+    }
     if report is None:
         message = f'{phase}: no motion has been judged yet'
         return status_msg(REPORT_NAME, DiagnosticStatus.OK, message, state)
@@ -308,6 +316,7 @@ def _report_values(report: VibrationReport) -> Values:
         'window': report.window if seen else None,
         'samples': report.samples,
         'fit_rms': report.fit.fit_rms,
+        'clock_offset': report.clock_offset,
         **_estimate_values(report.estimate),
     }
 
