@@ -40,7 +40,7 @@ WINGS = {
     'insensitive': 'motion_law arm',
     'peak': 'motion_law arm',
     'planning': 'motion_law insensitive peak arm',
-    'session': 'planning arm',
+    'session': 'planning tracking arm',
     'plant': 'arm',
     'monitor': 'arm',
     'tracking': 'arm',

@@ -155,17 +155,42 @@ class DurationRules:
         remedy = f'the shortest feasible duration is {found.duration:.9g} s'
         raise self._rejection(use, f'{self._sentence(use)}; {remedy}', found.duration)
 
+    def shortest_of(self, plan_of: Callable[[float], Plan], *, most: int) -> Plan:
+        """
+        Return the shortest plan that obeys the limits.
+
+        Parameters
+        ----------
+        plan_of
+            Plan of a duration [s].
+        most
+            Durations that are tried, about.
+
+        Raises
+        ------
+        RequestRejected
+            None of them obeys.
+
+        """
+        return self._shortest(plan_of, self.shortest, most=most)
+
     def _shortest(
         self,
         plan_of: Callable[[float], Plan],
         shortest: float,
         exceeded: LimitUse | None = None,
         bound: float | None = None,
+        most: int | None = None,
     ) -> Plan:
         """Return the shortest plan, or reject by what a prescribed one, or the best, exceeds."""
         try:
             return shortest_plan(
-                plan_of, self.limits, shortest=shortest, longest=self.longest, bound=bound
+                plan_of,
+                self.limits,
+                shortest=shortest,
+                longest=self.longest,
+                bound=bound,
+                most=most,
             )
         except NoFeasibleDuration as error:
             if error.at_end:

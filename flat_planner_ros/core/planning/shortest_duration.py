@@ -130,6 +130,7 @@ def shortest_plan(
     shortest: float,
     longest: float,
     bound: float | None = None,
+    most: int | None = None,
 ) -> Plan:
     """
     Return the plan of the shortest duration that obeys the limits.
@@ -144,6 +145,9 @@ def shortest_plan(
         Range of the duration [s].
     bound
         A duration below which none obeys [s], as some strategies know it; it is tried first.
+    most
+        Durations after which the search is content with what it has found; None for all that the
+        answer needs.
 
     Returns
     -------
@@ -163,9 +167,11 @@ def shortest_plan(
     """
     if not (0.0 < shortest <= longest and isfinite(longest)):
         raise InvalidRequest(f'no range of durations: {shortest:g} to {longest:g} s')
+    enough = inf if most is None else most
     if bound is None or not shortest < bound < longest:
-        return _Search(plan_of, limits, shortest, longest).run()
-    return _Search(plan_of, limits, float(f'{bound:.{DIGITS}g}'), longest, is_bound=True).run()
+        return _Search(plan_of, limits, shortest, longest, enough).run()
+    first = float(f'{bound:.{DIGITS}g}')
+    return _Search(plan_of, limits, first, longest, enough, is_bound=True).run()
 
 
 @dataclass(eq=False)
@@ -176,6 +182,7 @@ class _Search:
     limits: JointLimits
     shortest: float
     longest: float
+    most: float = inf
     is_bound: bool = False
     trials: dict[float, _Trial] = field(default_factory=dict)
     failure: FlatPlannerError | None = None
@@ -195,6 +202,11 @@ class _Search:
             self._scan(max(self.shortest, lowest.duration / SCAN_DEPTH), lowest.duration)
             if self._lowest is lowest and lowest.plan is not None:
                 return lowest.plan
+
+    @property
+    def _is_content(self) -> bool:
+        """Tell whether enough durations have been tried."""
+        return len(self.trials) >= self.most
 
     @property
     def _lowest(self) -> _Trial:
@@ -248,7 +260,7 @@ class _Search:
             else:
                 beyond = min(self.longest, max(trial.estimate * AIM, here * stride))
                 stride *= stride
-            if beyond == here:
+            if beyond == here or self._is_content:
                 break
             trial = self._try(beyond)
         return descends or trial.obeys
@@ -259,6 +271,8 @@ class _Search:
         while True:
             good = self._lowest
             below = [t for t in self.trials.values() if t.duration < good.duration]
+            if self._is_content:
+                return
             if not below:
                 if good.duration == self.shortest:
                     return
@@ -284,7 +298,7 @@ class _Search:
     def _scan(self, low: float, high: float) -> None:
         """Try a grid of durations between two."""
         duration = high / SCAN_STEP
-        while duration > low:
+        while duration > low and not self._is_content:
             self._try(duration, briefly=True)
             duration /= SCAN_STEP
         self._try(low, briefly=True)

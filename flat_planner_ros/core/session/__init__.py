@@ -17,7 +17,13 @@
 from flat_planner_ros.core.session.execution import Astray, Ended, Outcome, Shortfall
 from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint
 from flat_planner_ros.core.session.session import PlannerSession
-from flat_planner_ros.core.session.settings import SessionSettings, StartSource
+from flat_planner_ros.core.session.settings import (
+    ReplanFrom,
+    SessionSettings,
+    SettlePose,
+    StartSource,
+    WhenMoving,
+)
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 
 __all__ = [
@@ -29,9 +35,12 @@ __all__ = [
     'Motion',
     'Outcome',
     'PlannerSession',
+    'ReplanFrom',
     'SessionSettings',
+    'SettlePose',
     'Shortfall',
     'StartSource',
     'Timeline',
     'Track',
+    'WhenMoving',
 ]

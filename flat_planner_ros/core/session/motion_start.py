@@ -18,7 +18,20 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, JointSample
 from flat_planner_ros.core.planning import CONDITIONS, Reason, RequestRejected
-from flat_planner_ros.core.session.settings import SessionSettings, StartSource
+from flat_planner_ros.core.session.caught_start import (
+    is_driven,
+    is_moving,
+    measured_start,
+    Swing,
+    swing_time,
+)
+from flat_planner_ros.core.session.recent_states import RecentStates
+from flat_planner_ros.core.session.settings import (
+    ReplanFrom,
+    SessionSettings,
+    StartSource,
+    WhenMoving,
+)
 from flat_planner_ros.core.session.timeline import Motion, Timeline
 import numpy as np
 
@@ -41,6 +54,8 @@ class MotionStart(NamedTuple):
         (n - 1, 6) [rad/s^k]; None at rest.
     running
         The motion in force then, if one is.
+    swing
+        What the arm does, where the start is a measured one in motion; else None.
 
     """
 
@@ -48,19 +63,20 @@ class MotionStart(NamedTuple):
     pose: FloatArray
     jets: FloatArray | None = None
     running: Motion | None = None
+    swing: Swing | None = None
 
 
 def motion_start(
     settings: SessionSettings,
     timeline: Timeline,
-    measured: JointSample | None,
+    recent: RecentStates,
     last: FloatArray | None,
     stamp: float | None,
     now: float,
     lack: str = '',
 ) -> MotionStart:
     """
-    Return where a motion starts: at rest, or spliced to what is planned.
+    Return where a motion starts: at rest, in a swing, or spliced to what is planned.
 
     Parameters
     ----------
@@ -68,8 +84,8 @@ def motion_start(
         Source of a start at rest, tolerances, delays.
     timeline
         Motions that are planned.
-    measured
-        Last measured state, None before the first.
+    recent
+        Measured states.
     last
         Angles at the end of the last motion, shape (n,) [rad]; None if there has been none.
     stamp
@@ -88,15 +104,73 @@ def motion_start(
     """
     check_stamp(stamp, now)
     if not timeline.is_busy(now):
+        caught = _caught(settings, timeline, recent, stamp, now)
+        if caught is not None:
+            return caught
         time = now + settings.start_delay if stamp is None else stamp
-        return MotionStart(time, _pose_at_rest(settings, measured, last, now, lack))
+        return MotionStart(time, _pose_at_rest(settings, recent.last, last, now, lack))
     if not settings.is_stamped:
         raise RequestRejected(
             Reason.BUSY,
             'another motion is under way; none can take over from it as commands have no '
             'stamp (command.stamp)',
         )
-    return _splice(timeline, stamp, now + settings.lookahead)
+    start = _splice(timeline, stamp, now + settings.lookahead)
+    if settings.replan_from is ReplanFrom.REFERENCE or start.jets is None:
+        return start
+    return start_in_motion(settings, timeline, recent, start.time, now) or start
+
+
+def start_in_motion(
+    settings: SessionSettings,
+    timeline: Timeline,
+    recent: RecentStates,
+    time: float,
+    now: float,
+) -> MotionStart | None:
+    """
+    Return the measured start at an absolute time [s].
+
+    None if too little is known for it, or if something else than what is planned moves the arm.
+    """
+    measured = recent.last
+    if measured is None or abs(now - measured.time) > settings.joint_state_timeout:
+        return None
+    if not timeline.is_busy(now) and is_driven(settings, measured):
+        return None
+    found = measured_start(settings, recent, timeline, time)
+    if found is None:
+        return None
+    running = timeline.at(time) if timeline.is_busy(time) else None
+    return MotionStart(time, found.pose, found.jets, running, found.swing)
+
+
+def _caught(
+    settings: SessionSettings,
+    timeline: Timeline,
+    recent: RecentStates,
+    stamp: float | None,
+    now: float,
+) -> MotionStart | None:
+    """Return the start in a swing, None if the arm is at rest or swings are not to be caught."""
+    is_measured = settings.start_source in (StartSource.AUTO, StartSource.MEASURED)
+    is_wanted = settings.when_moving is WhenMoving.CATCH and is_measured and settings.is_stamped
+    if not is_wanted or recent.last is None or not is_moving(settings, timeline, recent):
+        return None
+    soonest = now + settings.lookahead
+    time = soonest if stamp is None else stamp
+    latest = now + swing_time(settings.arm)
+    if time > latest:
+        return None
+    if time < soonest:
+        raise RequestRejected(
+            Reason.OLD_HEADER_TIMESTAMP,
+            f'the arm moves: a motion can take over from {soonest:.3f} s on (replan.lookahead), '
+            f'not at {time:.3f} s',
+            value=time,
+            limit=soonest,
+        )
+    return start_in_motion(settings, timeline, recent, time, now)
 
 
 def _pose_at_rest(
@@ -140,8 +214,10 @@ def _splice(timeline: Timeline, stamp: float | None, soonest: float) -> MotionSt
         raise RequestRejected(Reason.INTERNAL, 'there is no motion to start from')
     elapsed = time - running.start
     request = running.plan.request
-    if elapsed < 0.0 or (elapsed == 0.0 and request.start_jets is None):
+    if elapsed <= 0.0 and request.start_jets is None:
         return MotionStart(time, request.start, running=running)
+    if elapsed < 0.0:  # it waits to catch a swing, whose state is known for its start
+        return _waiting(running, stamp)
     if time >= running.end:
         return MotionStart(time, request.final, running=running)
     if time < soonest:
@@ -157,6 +233,19 @@ def _splice(timeline: Timeline, stamp: float | None, soonest: float) -> MotionSt
         return MotionStart(time, request.start, request.start_jets, running)
     samples = running.reference(time)
     return MotionStart(time, samples.positions[0], samples.planned[:, :CONDITIONS, 0], running)
+
+
+def _waiting(running: Motion, stamp: float | None) -> MotionStart:
+    """Return the start of a motion in the place of one that waits for its start in a swing."""
+    time = running.start
+    if stamp is not None:
+        raise RequestRejected(
+            Reason.BUSY,
+            f'motion {running.plan_id} catches the arm at {time:.3f} s: another one can take over '
+            f'from then on',
+        )
+    request = running.plan.request
+    return MotionStart(time, request.start, request.start_jets, running)
 
 
 def check_stamp(stamp: float | None, now: float) -> None:

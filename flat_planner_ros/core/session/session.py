@@ -18,24 +18,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 
-from flat_planner_ros.core.arm import (
-    InvalidRequest,
-    JointSample,
-    OutOfReach,
-    UncertifiedPlan,
-)
+from flat_planner_ros.core.arm import FloatArray, JointSample
 from flat_planner_ros.core.planning import (
-    LimitUse,
-    MotionRequest,
     Plan,
-    planned_at_rest,
     PlanSamples,
     Reason,
     RequestRejected,
     stop_plan,
-    ViaPoint,
-    with_via_times,
 )
+from flat_planner_ros.core.session.caught_start import is_moving
 from flat_planner_ros.core.session.execution import (
     Astray,
     check_carried_out,
@@ -44,22 +35,21 @@ from flat_planner_ros.core.session.execution import (
     Outcome,
 )
 from flat_planner_ros.core.session.goal import checked_goal, Goal
+from flat_planner_ros.core.session.goal_plan import plan_of_goal, settling_plan
 from flat_planner_ros.core.session.motion_start import (
     check_stamp,
     motion_start,
     MotionStart,
+    start_in_motion,
 )
+from flat_planner_ros.core.session.recent_states import RecentStates
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
-import numpy as np
 
 Clock = Callable[[], float]
 
 DELIVERY_SHARE = 0.25
 """Part of the lookahead that is left for a command to reach its executor [-]."""
-
-NOMINAL_DURATION = 1.0
-"""Duration of a request before its own is found [s]."""
 
 
 class PlannerSession:
@@ -83,7 +73,7 @@ class PlannerSession:
         """Start at rest, without a measurement."""
         self.settings = settings
         self.lack = ''
-        self._measured: JointSample | None = None
+        self._recent = RecentStates()
         self._timeline = Timeline()
         self._motion: Motion | None = None
         self._ended: list[Ended] = []
@@ -114,20 +104,21 @@ class PlannerSession:
     @property
     def measured(self) -> JointSample | None:
         """Return the last measured state, None before the first."""
-        return self._measured
+        return self._recent.last
 
     def measure(self, sample: JointSample) -> None:
         """Take the measured state, in the order of the session's joints, unless it comes late."""
-        age = 0.0 if self._measured is None else self._measured.time - sample.time
+        last = self._recent.last
+        age = 0.0 if last is None else last.time - sample.time
         # Far back is no late message, but a clock that was set back.
         if not 0.0 < age <= self.settings.joint_state_timeout:
-            self._measured = sample
+            self._recent.add(sample)
             self._watch.follow(self.settings, self._timeline, sample)
 
     def knows_start(self, now: float) -> bool:
         """Tell whether goals can be judged: there is a time [s], and a state where one counts."""
         is_measured = self.settings.start_source in (StartSource.AUTO, StartSource.MEASURED)
-        is_known = self._measured is not None or self._timeline.is_busy(now) or not is_measured
+        is_known = self._recent.last is not None or self._timeline.is_busy(now) or not is_measured
         return now > 0.0 and is_known
 
     def patience(self, goal: Goal) -> float:
@@ -172,22 +163,49 @@ class PlannerSession:
         _check_time(now)
         start = self._start(goal.stamp, now)
         if start.running is not None:
-            check_carried_out(settings, self._timeline, self._measured, now)
-        found, exceeded = _plan_of_goal(settings, start, asked, duration)
-        wanted = settings.options.strategy
-        motion = Motion(
-            plan_id=self._count + 1,
-            plan=found,
-            samples=found.sample(settings.period),
-            start=start.time,
-            planned_at=now,
-            is_shortest=found.duration != duration,
-            exceeded=exceeded,
-            replaced_strategy=None if found.options.strategy is wanted else wanted,
-        )
+            check_carried_out(settings, self._timeline, self._recent.last, now)
+        found, exceeded = plan_of_goal(settings, start, asked, duration)
+        motion = self._motion_of(found, start, now)
+        motion = replace(motion, is_shortest=found.duration != duration, exceeded=exceeded)
         motion = self._accepted(motion, start, goal.stamp, clock)
         self._last_goal = replace(goal, stamp=None)
         return motion
+
+    def settle(self, now: float, clock: Clock | None = None) -> Motion | None:
+        """
+        Return the motion that brings the arm to rest from what is measured, None at rest.
+
+        Parameters
+        ----------
+        now, clock
+            As for `submit`.
+
+        Raises
+        ------
+        RequestRejected
+            Too little is known of the arm's motion, or the limits allow none to rest; all that is
+            planned is untouched.
+
+        """
+        _check_time(now)
+        settings, timeline = self.settings, self._timeline
+        if not timeline.is_busy(now) and not is_moving(settings, timeline, self._recent):
+            return None
+        time = timeline.splice_time(now + settings.lookahead)
+        start = start_in_motion(settings, timeline, self._recent, time, now)
+        if start is None or not settings.is_stamped:
+            raise RequestRejected(
+                Reason.START_STATE_UNKNOWN,
+                'no free swing is measured: there are too few joint states, the passive joint '
+                'stands beside its zero, or something else moves the arm'
+                if start is None
+                else 'commands have no stamp (command.stamp), so that no start can be foreseen',
+            )
+        found = settling_plan(settings, start, self._last_pose)
+        number = self._count + 1 if start.running is None else start.running.plan_id
+        motion = self._motion_of(found, start, now)
+        motion = replace(motion, plan_id=number, is_stop=True, is_shortest=True)
+        return self._accepted(motion, start, None, clock)
 
     def stop(self, now: float, clock: Clock | None = None) -> Motion | None:
         """
@@ -234,7 +252,7 @@ class PlannerSession:
         where it cannot be seen.
         """
         self._end_motions(now)
-        ended = self._watch.take_arrived(self.settings, self._timeline, self._measured, now)
+        ended = self._watch.take_arrived(self.settings, self._timeline, self._recent.last, now)
         ended += self._ended
         self._ended = []
         return ended
@@ -258,13 +276,26 @@ class PlannerSession:
         motion = self._timeline.at(now) or self._motion
         return None if motion is None else motion.reference(now)
 
+    def _motion_of(self, found: Plan, start: MotionStart, now: float) -> Motion:
+        """Return a plan with its place in time and the next number."""
+        wanted = self.settings.options.strategy
+        return Motion(
+            plan_id=self._count + 1,
+            plan=found,
+            samples=found.sample(self.settings.period),
+            start=start.time,
+            planned_at=now,
+            swing=None if start.swing is None else start.swing.amplitude,
+            replaced_strategy=None if found.options.strategy is wanted else wanted,
+        )
+
     def _accepted(
         self, motion: Motion, start: MotionStart, stamp: float | None, clock: Clock | None
     ) -> Motion:
         """Return a motion with its place in time, which it takes unless planning took too long."""
         settings = self.settings
         now = motion.planned_at if clock is None else clock()
-        if start.running is None:
+        if start.running is None and start.jets is None:
             check_stamp(stamp, now)
             if stamp is None:
                 motion = replace(motion, start=now + settings.start_delay)
@@ -272,22 +303,21 @@ class PlannerSession:
             raise RequestRejected(
                 Reason.BUSY,
                 f'planning took {now - motion.planned_at:.3f} s, too long for a start in motion '
-                f'{settings.lookahead:g} s ahead (replan.lookahead); the motion goes on',
+                f'{settings.lookahead:g} s ahead (replan.lookahead); all goes on as it was',
                 value=now - motion.planned_at,
                 limit=(1.0 - DELIVERY_SHARE) * settings.lookahead,
             )
         if start.running is None:
             # From its next start on, nobody can tell any more where the arm has come to.
             self._end_motions(now)
-            measured = self._measured
+            measured = self._recent.last
             self._ended += self._watch.take_arrived(settings, self._timeline, measured, inf)
         if settings.execute:
             for old in self._timeline.replaced(motion.start):
                 if not (motion.is_stop and old.plan_id == motion.plan_id):
                     self._ended.append(Ended(old, Outcome.PREEMPTED))
             self._timeline = self._timeline.with_motion(motion)
-        if not motion.is_stop:
-            self._count = motion.plan_id
+        self._count = max(self._count, motion.plan_id)
         self._motion = motion
         return motion
 
@@ -300,10 +330,14 @@ class PlannerSession:
 
     def _start(self, stamp: float | None, now: float) -> MotionStart:
         """Return where a motion starts."""
-        last = None if self._motion is None else self._motion.plan.request.final
         return motion_start(
-            self.settings, self._timeline, self._measured, last, stamp, now, self.lack
+            self.settings, self._timeline, self._recent, self._last_pose, stamp, now, self.lack
         )
+
+    @property
+    def _last_pose(self) -> FloatArray | None:
+        """Return the end of the last motion, None if there has been none."""
+        return None if self._motion is None else self._motion.plan.request.final
 
 
 def _check_time(now: float) -> None:
@@ -313,65 +347,3 @@ def _check_time(now: float) -> None:
             Reason.START_STATE_UNKNOWN,
             'there is no time yet: use_sim_time is set, but no /clock has been received',
         )
-
-
-def _plan_of_goal(
-    settings: SessionSettings, start: MotionStart, goal: Goal, duration: float | None
-) -> tuple[Plan, LimitUse | None]:
-    """Return the plan of a checked goal within the limits, and what made it longer than asked."""
-    arm, options = settings.arm, settings.options
-    if start.jets is not None and start.running is not None:
-        # What the arm is planned to do then is said in terms of the model it was planned with.
-        arm = start.running.plan.problem.arm
-        options = replace(options, flat_model=start.running.plan.options.flat_model)
-    rules = settings.duration_rules(start.pose)
-    rules.check_pose('the start', start.pose)
-    *via, final = (np.array(point.positions) for point in goal.points)
-    for index, positions in enumerate(via):
-        rules.check_pose(f'via point {index}', positions)
-    rules.check_pose('the final', final)
-    is_prescribed = duration is not None
-
-    try:
-        request = _request(goal, start, duration or NOMINAL_DURATION)
-        if not via or goal.duration is not None:
-            return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
-        request = with_via_times(request, arm, options)
-        found, exceeded = rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
-        if is_prescribed:
-            return found, exceeded
-        # The best shares of the time depend on the time, if little.
-        request = with_via_times(found.request, arm, options)
-        return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
-    except InvalidRequest as error:
-        raise RequestRejected(Reason.INVALID_GOAL, str(error)) from error
-    except OutOfReach as error:
-        raise RequestRejected(
-            Reason.SOLVER_FAILED, str(error), value=error.value, limit=error.limit
-        ) from error
-    except UncertifiedPlan as error:
-        raise RequestRejected(
-            Reason.ILL_CONDITIONED,
-            f'no plan to the promised accuracy: {error}; use a longer duration or smaller weights',
-            value=error.residual,
-            limit=error.tolerance,
-        ) from error
-
-
-def _request(goal: Goal, start: MotionStart, duration: float) -> MotionRequest:
-    """Return what is asked of a plan; via times that are to be chosen are even for now."""
-    *passed, final = goal.points
-    via = tuple(
-        ViaPoint(
-            time=point.time or duration * index / len(goal.points),
-            values=np.array(planned_at_rest(np.array(point.positions))),
-        )
-        for index, point in enumerate(passed, start=1)
-    )
-    return MotionRequest(
-        start=start.pose,
-        final=np.array(final.positions),
-        duration=duration,
-        via=via,
-        start_jets=start.jets,
-    )

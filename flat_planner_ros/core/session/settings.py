@@ -47,6 +47,36 @@ class StartSource(Enum):
     """A given position, checked against a measured state if there is one."""
 
 
+class WhenMoving(Enum):
+    """What becomes of a goal while the arm moves though nothing is planned."""
+
+    CATCH = 'catch'
+    """Its motion starts in motion: from the measured state, as it will be then."""
+
+    REFUSE = 'refuse'
+    """It is refused."""
+
+
+class ReplanFrom(Enum):
+    """Where a motion starts that takes over from another."""
+
+    REFERENCE = 'reference'
+    """Where the arm is planned to be."""
+
+    MEASURED = 'measured'
+    """Where it will be by what is measured."""
+
+
+class SettlePose(Enum):
+    """Where an arm in motion is brought to rest."""
+
+    HERE = 'here'
+    """Where it would swing out."""
+
+    LAST_GOAL = 'last_goal'
+    """In the pose of the last goal."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SessionSettings:
     """
@@ -78,10 +108,16 @@ class SessionSettings:
         Age from which a measured state is stale [s].
     start_wait
         Time that a goal may wait for the first measured state [s]; 0 for none.
+    when_moving
+        What becomes of goals while the arm moves though nothing is planned.
     start_delay
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
-        From accepting a goal to its start while another motion is under way or waits [s].
+        From accepting a goal to its start while the arm moves, or another motion waits [s].
+    replan_from
+        Where a motion starts that takes over from another.
+    settle_pose
+        Where `settle` brings the arm to rest.
     replan_tolerance
         Largest distance of a measured actuated joint from what was planned for that time at which
         another motion may take over [rad]; 0 for any.
@@ -113,8 +149,11 @@ class SessionSettings:
     velocity_tolerance: float = 0.1
     joint_state_timeout: float = 0.5
     start_wait: float = 2.0
+    when_moving: WhenMoving = WhenMoving.CATCH
     start_delay: float = 0.05
     lookahead: float = 0.1
+    replan_from: ReplanFrom = ReplanFrom.REFERENCE
+    settle_pose: SettlePose = SettlePose.HERE
     replan_tolerance: float = 0.5
     finish_tolerance: float = 0.1
     finish_patience: float = 1.0

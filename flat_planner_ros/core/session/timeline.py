@@ -55,11 +55,13 @@ class Motion:
     cut
         Absolute time at which another motion is spliced on [s]; None if none does.
     is_stop
-        Whether it brings a motion of the same number to rest early.
+        Whether it brings a motion of the same number, or an arm that moves by itself, to rest.
     is_shortest
         Whether its duration is the shortest within the limits, which was looked for.
     exceeded
         What the prescribed duration would have exceeded, if the motion was stretched.
+    swing
+        Amplitude of the measured swing that it starts from [rad]; None for another start.
     replaced_strategy
         The strategy that was asked for, where the plan had to take another one.
 
@@ -74,6 +76,7 @@ class Motion:
     is_stop: bool = False
     is_shortest: bool = False
     exceeded: LimitUse | None = None
+    swing: float | None = None
     replaced_strategy: Strategy | None = None
 
     @property
@@ -121,12 +124,19 @@ class Timeline:
     ----------
     motions
         None overlaps another.
+    past
+        The last one that has ended, if any has.
 
     """
 
-    def __init__(self, motions: Sequence[Motion] = ()) -> None:
-        """Keep the motions."""
+    def __init__(self, motions: Sequence[Motion] = (), past: Motion | None = None) -> None:
         self.motions = tuple(motions)
+        self._past = past
+
+    @property
+    def known(self) -> tuple[Motion, ...]:
+        """Return the motions, and before them the last one that has ended, if any has."""
+        return self.motions if self._past is None else (self._past, *self.motions)
 
     @property
     def last(self) -> Motion | None:
@@ -154,7 +164,9 @@ class Timeline:
 
     def after(self, now: float) -> 'Timeline':
         """Return the timeline without what has come to its end."""
-        return Timeline([motion for motion in self.motions if now < motion.end])
+        ended = [motion for motion in self.known if motion.end <= now]
+        left = [motion for motion in self.motions if now < motion.end]
+        return Timeline(left, ended[-1] if ended else self._past)
 
     def with_motion(self, motion: Motion) -> 'Timeline':
         """Return the timeline in which a motion replaces all that was planned from its start."""
@@ -163,7 +175,7 @@ class Timeline:
             for old in self.motions
             if old.start < motion.start
         ]
-        return Timeline([*kept, motion])
+        return Timeline([*kept, motion], self._past)
 
     def moves(self, since: float, until: float) -> bool:
         """Tell whether any motion is planned for part of a time [s]."""

@@ -67,6 +67,9 @@ class ArmObserver:
         Usual time between two samples [s].
     bandwidth
         Of the estimate [rad/s].
+    held
+        Whether a stiff position servo moves joint n-1: what acts on the last two links, and
+        disturbs them, is then the acceleration of link n-1 [rad/s^2], not an effort.
 
     Raises
     ------
@@ -75,10 +78,12 @@ class ArmObserver:
 
     """
 
-    def __init__(self, arm: PlanarArm, period: float, bandwidth: float) -> None:
+    def __init__(
+        self, arm: PlanarArm, period: float, bandwidth: float, *, held: bool = False
+    ) -> None:
         """Rest at zero."""
         self._arm = arm
-        self._links = Observer(last_links(arm), period, bandwidth)
+        self._links = Observer(last_links(arm, held=held), period, bandwidth)
         self._joints = Observer(linearised_joint(), period, bandwidth, arm.n - 2)
 
     def restart(self, sample: JointSample) -> None:
@@ -104,7 +109,7 @@ class ArmObserver:
         """Return what will be at a time [s], under the inputs noted."""
         return Estimate(self._links.predicted(time), self._joints.predicted(time))
 
-    def note(self, time: float, effort: float, accelerations: FloatArray) -> None:
+    def note(self, time: float, driving: float, accelerations: FloatArray) -> None:
         """
         Note what acts from a time [s] on.
 
@@ -112,13 +117,14 @@ class ArmObserver:
         ----------
         time
             When it begins to act [s].
-        effort
-            Of joint n-1, without its friction [N m].
+        driving
+            Effort of joint n-1, without its friction [N m], or acceleration of link n-1 if that
+            is held.
         accelerations
             Of the joints before it, shape (n-2,) [rad/s^2].
 
         """
-        self._links.apply(time, np.array([effort]))
+        self._links.apply(time, np.array([driving]))
         self._joints.apply(time, accelerations)
 
     def note_efforts(self, time: float, efforts: FloatArray) -> None:

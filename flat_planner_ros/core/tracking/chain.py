@@ -96,12 +96,26 @@ class Chain:
         whole = expm(self.disturbed * time)
         return whole[:-1, :-1], whole[:-1, -1]
 
-    def jet(self, state: FloatArray, orders: int) -> FloatArray:
-        """Return the first derivatives of the flat output, u = 0 from now on, shape (orders,)."""
+    def jet(self, state: FloatArray, orders: int, inputs: tuple[float, ...] = ()) -> FloatArray:
+        """
+        Return the first derivatives of the flat output, shape (orders,).
+
+        Parameters
+        ----------
+        state
+            Shape (m,).
+        orders
+            How many.
+        inputs
+            The input and its derivatives, zero from where they end.
+
+        """
         jet = np.zeros(max(orders, self.order))
         jet[: self.order] = np.linalg.solve(self.coordinates, state)
         for k in range(self.order, orders):
-            jet[k] = -self.input_row[:-1] @ jet[k - self.order : k] / self.input_row[-1]
+            entry = inputs[k - self.order] if k - self.order < len(inputs) else 0.0
+            known = self.input_row[:-1] @ jet[k - self.order : k]
+            jet[k] = (entry - known) / self.input_row[-1]
         return jet[:orders]
 
 

@@ -26,19 +26,22 @@ ORDERS = 6
 
 class MovingStart(NamedTuple):
     """
-    A motion's start in motion, and where the arm would come to rest without it.
+    A motion's start in motion, and where the arm would be without its swing.
 
     Attributes
     ----------
     jets
         Derivatives 0 to 5 of the planned variables, shape (n-1, 6) [rad/s^k].
     rest
-        Pose that the swing dies away to if the first joints are held, shape (n,) [rad].
+        Pose that the arm swings about, shape (n,) [rad].
+    drift
+        Velocity of that pose if nothing acts, shape (n,) [rad/s].
 
     """
 
     jets: FloatArray
     rest: FloatArray
+    drift: FloatArray
 
 
 def moving_start(
@@ -48,12 +51,13 @@ def moving_start(
     ahead: float,
     *,
     held: bool = False,
+    inputs: tuple[float, ...] = (),
 ) -> MovingStart:
     """
     Return the start of a motion that catches a swing.
 
     Until then nothing moves the arm but its spring; the joints before the last two go on as they
-    move. The effort of joint n-1 is zero at the start, or what holds it.
+    move.
 
     Parameters
     ----------
@@ -64,7 +68,10 @@ def moving_start(
     ahead
         Time from that state to the start of the motion [s].
     held
-        Whether position servos hold the actuated joints; otherwise joint n-1 is free.
+        Whether a position servo moves joint n-1; otherwise its effort does.
+    inputs
+        What acts at the start, and its derivative: the effort of joint n-1 [N m], or the
+        acceleration of link n-1 if that is held [rad/s^2]; zero if left out.
 
     Raises
     ------
@@ -74,15 +81,17 @@ def moving_start(
     """
     chain = last_links(arm, held=held)
     state = np.array([positions[:-1].sum(), positions[-1], velocities[:-1].sum(), velocities[-1]])
-    if held:
-        state[2] = 0.0
     flow, _ = chain.over(ahead)
     jets = np.zeros((arm.n - 1, ORDERS))
-    jets[0] = chain.jet(flow[:4, :4] @ state, ORDERS)
+    jets[0] = chain.jet(flow[:4, :4] @ state, ORDERS, inputs)
     jets[1:, 0] = positions[:-2] + ahead * velocities[:-2]
     jets[1:, 1] = velocities[:-2]
     # Integrated twice, input_row @ jet = 0 says that this combination stays what it is.
     row = chain.input_row[2:]
-    last = float(row @ jets[0, :3] / row[0])
-    inner = jets[1:, 0]
-    return MovingStart(jets, np.array([*inner, last - inner.sum(), 0.0]))
+    centre, drift = (_pose(row @ jets[0, k : k + 3] / row[0], jets[1:, k]) for k in (0, 1))
+    return MovingStart(jets, centre, drift)
+
+
+def _pose(last: float, inner: FloatArray) -> FloatArray:
+    """Return joint angles, or their rates, of link n-1 and of those before, shape (n,)."""
+    return np.array([*inner, last - inner.sum(), 0.0])

@@ -22,13 +22,16 @@ motion, the report after it.
 
 from collections.abc import Sequence
 from importlib import import_module
-from threading import Thread
+from threading import Lock, Thread
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+LOADING = Lock()
+"""Held while one node loads: parts of SciPy that two threads load at once may see halves."""
+
 PLANNING = ('scipy.linalg.lapack', 'scipy.optimize')
-"""Modules that planning through via points or in motion needs."""
+"""Modules that planning through via points, in motion or from a swing needs."""
 
 REPORTING = ('scipy.fft', 'scipy.integrate', 'scipy.optimize')
 """Modules that the report on a motion needs."""
@@ -46,8 +49,9 @@ def load_early(node: Node, libraries: Sequence[str]) -> None:
     """
 
     def load() -> None:
-        for library in libraries:
-            import_module(library)
+        with LOADING:
+            for library in libraries:
+                import_module(library)
 
     def start() -> None:
         timer.cancel()

@@ -23,7 +23,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Reason, RequestRejected
-from flat_planner_ros.core.session import Goal, PlannerSession
+from flat_planner_ros.core.session import Goal, Motion, PlannerSession
 from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
@@ -66,7 +66,11 @@ class PlannerNode(GuardedNode):
             self, self._log, lambda: self._settings, lambda: self._sent_start, self._publish_status
         )
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
-        self.create_service(Trigger, interfaces.STOP, self._on_stop)
+        for service, act, nothing in (
+            (interfaces.STOP, self._session.stop, 'nothing to stop: no motion is under way'),
+            (interfaces.SETTLE, self._session.settle, 'nothing to settle: the arm is at rest'),
+        ):
+            self.create_service(Trigger, service, partial(self._bring_to_rest, act, nothing))
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
         commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
         self._watch = GraphWatch(
@@ -158,18 +162,23 @@ class PlannerNode(GuardedNode):
         response.message = status.message
         return response
 
-    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Bring the arm to rest early."""
+    def _bring_to_rest(
+        self,
+        act: Callable[[float, Callable[[], float]], Motion | None],
+        nothing: str,
+        _: Trigger.Request,
+        response: Trigger.Response,
+    ) -> Trigger.Response:
+        """Send the motion that an act of the session returns, if there is one."""
         self._goals.answer_all()
         try:
-            motion = self._session.stop(self._now(), self._now)
+            motion = act(self._now(), self._now)
         except FlatPlannerError as error:
             response.success = False
-            response.message = f'not stopped: {error}'
+            response.message = f'not brought to rest: {error}'
             return response
-        response.success = True
+        response.success, response.message = True, nothing
         if motion is None:
-            response.message = 'nothing to stop: no motion is under way'
             return response
         self._publish_motion()
         response.message = (

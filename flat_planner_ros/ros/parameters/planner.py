@@ -22,7 +22,13 @@ from math import isqrt
 from flat_planner_ros.core.arm import Drive, FlatModel, JointStateRules
 from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy
 from flat_planner_ros.core.planning import check_options, JointLimits, OnViolation, PlanningOptions
-from flat_planner_ros.core.session import SessionSettings, StartSource
+from flat_planner_ros.core.session import (
+    ReplanFrom,
+    SessionSettings,
+    SettlePose,
+    StartSource,
+    WhenMoving,
+)
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
@@ -210,6 +216,12 @@ ROWS = [
         lower=0.0,
         upper=60.0,
     ),
+    Row(
+        'start.moving',
+        SessionSettings.when_moving,
+        '',
+        'what becomes of a goal while the arm moves though nothing is planned',
+    ),
     *JOINT_STATE_ROWS,
     Row(
         'start_delay',
@@ -250,6 +262,19 @@ ROWS = [
         'time after the end of a motion in which the arm must be there at rest',
         lower=0.0,
         upper=60.0,
+    ),
+    Row(
+        'replan.from',
+        SessionSettings.replan_from,
+        '',
+        'where a motion starts that takes over from another',
+        'as planned, or as measured',
+    ),
+    Row(
+        'settle.pose',
+        SessionSettings.settle_pose,
+        '',
+        'where ~/settle brings the arm to rest',
     ),
     Row(
         'execute', SessionSettings.execute, '', 'publish commands', 'false = plan and report only'
@@ -337,8 +362,11 @@ def build(values: Values) -> PlannerSettings:
         velocity_tolerance=values['start.velocity_tolerance'],
         joint_state_timeout=values['start.joint_state_timeout'],
         start_wait=values['start.wait'],
+        when_moving=WhenMoving(values['start.moving']),
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
+        replan_from=ReplanFrom(values['replan.from']),
+        settle_pose=SettlePose(values['settle.pose']),
         replan_tolerance=values['replan.tolerance'],
         finish_tolerance=values['finish.position_tolerance'],
         finish_patience=values['finish.patience'],

@@ -122,6 +122,7 @@ def accepted_status(
         **_motion_values(motion, 'ACCEPTED'),
         'duration_min': plan.duration if motion.is_shortest else None,
         'planning_time': planning_time,
+        'swing': motion.swing,
         'boundary_residual': plan.boundary_residual,
         'optimality_residual': plan.optimality_residual,
         'cost': plan.cost_value,
@@ -129,6 +130,8 @@ def accepted_status(
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
         values.update(_joint_values(quantity, joints, getattr(plan, quantity).tolist()))
+    if motion.swing is not None:
+        message += f', from a swing of {motion.swing:.3g} rad'
     level = DiagnosticStatus.OK
     if doubt:
         level = DiagnosticStatus.WARN

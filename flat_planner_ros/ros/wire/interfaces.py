@@ -43,6 +43,7 @@ REFERENCE = '~/reference'
 STATUS = '~/status'
 REPLAN = '~/replan'
 STOP = '~/stop'
+SETTLE = '~/settle'
 ADOPT = '~/adopt_estimate'
 
 RESET = '~/reset'
