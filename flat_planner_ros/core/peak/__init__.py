@@ -21,6 +21,7 @@ from flat_planner_ros.core.peak.motion import (
     peak_motion,
     peak_motion_from,
     shortest_peak_duration,
+    shortest_peak_duration_from,
 )
 from flat_planner_ros.core.peak.problem import PeakMotion
 from flat_planner_ros.core.peak.settings import MAX_INTERVALS, MIN_INTERVALS, PeakSettings
@@ -35,5 +36,6 @@ __all__ = [
     'PeakMotion',
     'PeakSettings',
     'shortest_peak_duration',
+    'shortest_peak_duration_from',
     'SwitchingFunction',
 ]

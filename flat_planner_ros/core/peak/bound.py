@@ -91,6 +91,15 @@ class SwitchingFunction:
         edges = np.concatenate([[0.0], self.switches(duration), [duration]])
         return float(np.abs(np.diff(self.area(edges))).sum())
 
+    def magnitudes(self, durations: FloatArray) -> FloatArray:
+        """Return the integrals of |s| over the times that are left of durations, shape (m,)."""
+        edges = np.append(0.0, self.switches(float(durations.max())))
+        areas = self.area(edges)
+        before = np.append(0.0, np.cumsum(np.abs(np.diff(areas))))
+        last = np.searchsorted(edges, durations, side='right') - 1
+        magnitudes: FloatArray = before[last] + np.abs(self.area(durations) - areas[last])
+        return magnitudes
+
     def switches(self, duration: float) -> FloatArray:
         """Return the times left at which s changes its sign, ascending, shape (m,) [s]."""
         turns = self.mode.frequency * duration / (2.0 * np.pi)

@@ -16,11 +16,11 @@
 
 from dataclasses import replace
 from functools import lru_cache
-from math import factorial, inf, log
+from math import factorial, inf, log, sqrt
 
 from flat_planner_ros.core.arm import Drive, FloatArray, PlanarArm
 from flat_planner_ros.core.peak.driven_mode import DrivenMode
-from flat_planner_ros.core.peak.problem import PeakMotion, PeakProblem, START_ORDERS
+from flat_planner_ros.core.peak.problem import PeakMotion, PeakProblem, START_ORDERS, STRIDE
 from flat_planner_ros.core.peak.settings import PeakSettings
 import numpy as np
 
@@ -35,9 +35,6 @@ ANCHOR_RATIO = 1.05
 
 DIGITS = 9
 """Significant digits of the durations tried: as many as are reported."""
-
-STRIDE = 4.0
-"""Largest ratio of a duration tried to the one before, beyond what a bad guess is off [-]."""
 
 MAX_STEPS = 20
 """Programmes on the way to the shortest duration; three or four are usual."""
@@ -117,7 +114,7 @@ def peak_motion_from(
     duration: float,
     settings: PeakSettings,
     start: FloatArray,
-    final: float,
+    final: float | None,
     drive: Drive = Drive.EFFORT,
 ) -> PeakMotion:
     """
@@ -130,7 +127,7 @@ def peak_motion_from(
     start
         Derivatives 0 to 4 of the planned variable, or more, shape (5,) [rad/s^k].
     final
-        The planned variable at rest at the end [rad].
+        The planned variable at rest at the end [rad]; None for where the peak is least.
 
     Raises
     ------
@@ -138,19 +135,81 @@ def peak_motion_from(
         As for `peak_motion`.
 
     """
+    return _problem_from(arm, duration, settings, start, final, drive).motion_within_velocity()
+
+
+def _problem_from(
+    arm: PlanarArm,
+    duration: float,
+    settings: PeakSettings,
+    start: FloatArray,
+    final: float | None,
+    drive: Drive,
+) -> PeakProblem:
+    """Return the problem of a motion from a start in motion."""
     way = np.array(start[:START_ORDERS])
+    place = float(way[0]) if final is None else float(final)
     # Counted from the end, so that a distant place costs no digits of a short way.
-    way[0] -= final
-    plain = replace(settings, insensitive=False)
+    way[0] -= place
     return PeakProblem(
         mode=DrivenMode.of(arm, drive),
         duration=duration,
-        settings=plain,
+        settings=replace(settings, insensitive=False),
         start=way,
-        final=0.0,
+        final=None if final is None else 0.0,
         distance=1.0,
-        place=float(final),
-    ).motion_within_velocity()
+        place=place,
+    )
+
+
+def shortest_peak_duration_from(
+    arm: PlanarArm,
+    settings: PeakSettings,
+    start: FloatArray,
+    final: float,
+    peak: float,
+    drive: Drive = Drive.EFFORT,
+) -> float:
+    """
+    Return the shortest duration from a start in motion to rest within a peak.
+
+    From below: the dual values of a duration that is too short rule out all up to the next one.
+
+    Parameters
+    ----------
+    arm, settings, start, final, drive
+        As for `peak_motion_from`; bounds on rate and velocity are left out.
+    peak
+        Largest magnitude of the drive, above that at the start.
+
+    References
+    ----------
+    (B9) of docs/derivation.md.
+
+    """
+    plain = replace(settings, effort_rate=0.0, velocity=inf)
+    wanted = (1.0 - MARGIN) * peak
+    problem = _problem_from(arm, 1.0, plain, start, final, drive)
+    duration = _rigid_duration(
+        float(problem.state.sigma), float(problem.state.sigma_rate), problem.mode.gain * wanted
+    )
+    for _ in range(MAX_STEPS):
+        duration = float(f'{duration:.{DIGITS}g}')
+        found = replace(problem, duration=duration).motion()
+        if abs(found.inner_peak / wanted - 1.0) < MARGIN:
+            break
+        # A little further, so that the last step, too short as every one, ends within.
+        least = duration * (1.0 + MARGIN) if found.inner_peak > wanted else 0.0
+        duration = max(found.next_duration(wanted), least)
+    return duration
+
+
+def _rigid_duration(way: float, velocity: float, acceleration: float) -> float:
+    """Return the least time to rest at 0 within an acceleration, as if the links were rigid."""
+    stopping = velocity * abs(velocity) / (2.0 * acceleration)
+    sign = 1.0 if way + stopping > 0.0 else -1.0
+    turn = sqrt(0.5 * velocity**2 + sign * way * acceleration)
+    return max((sign * velocity + 2.0 * turn) / acceleration, abs(velocity) / acceleration)
 
 
 def shortest_peak_duration(

@@ -43,6 +43,9 @@ MOST_INTERVALS = 4096
 MAX_TURN = 1.0
 """Turn of the oscillation on one piece, up to which its series serve [rad]."""
 
+PLACE = 1
+"""Row of `DrivenMode.end_rows` that tells where a motion ends."""
+
 START_ORDERS = 5
 """Derivatives of the planned variable that a start gives, the value included."""
 
@@ -51,6 +54,15 @@ VELOCITY_ROUNDS = 6
 
 VELOCITY_MARGIN = 1e-5
 """Share of the velocity that is kept in reserve between the places where it is looked at [-]."""
+
+STRIDE = 4.0
+"""Largest ratio of a duration to the next one tried, beyond what a bad guess is off [-]."""
+
+BACK_STRIDE = 1.2
+"""The same towards shorter ones, after a step that went a little too far [-]."""
+
+PLACES = 400
+"""Durations in between at which is looked whether the dual values rule them out."""
 
 PLACES_PER_PIECE = 4
 """Places between two samples at which the velocity is looked at."""
@@ -68,7 +80,7 @@ class PeakProblem:
     start
         Derivatives 0 to 4 of the planned variable at the start.
     final
-        The planned variable at the end.
+        The planned variable at the end; None for any.
     distance
         What 1 rad of them stands for [rad].
     place
@@ -80,7 +92,7 @@ class PeakProblem:
     duration: float
     settings: PeakSettings
     start: FloatArray
-    final: float
+    final: float | None
     distance: float
     place: float = 0.0
 
@@ -106,16 +118,24 @@ class PeakProblem:
 
     @cached_property
     def target(self) -> FloatArray:
-        """Return what the whole drive has to add to the state at the end."""
-        swing = self.state.swing * np.exp(self.mode.pole * self.duration)
-        target = np.zeros(6 if self.settings.insensitive else 4)
-        target[:4] = (
-            -self.state.sigma_rate,
-            self.final - self.state.sigma - self.state.sigma_rate * self.duration,
-            -swing.real,
-            -swing.imag,
-        )
-        return target
+        """Return what the whole drive has to add to the state at the end, shape (r,)."""
+        return self.targets(np.array([self.duration]))[:, 0]
+
+    def targets(self, durations: FloatArray) -> FloatArray:
+        """Return the same for other durations, shape (r, m)."""
+        swings = self.state.swing * np.exp(self.mode.pole * durations)
+        targets = np.zeros((6 if self.settings.insensitive else 4, len(durations)))
+        targets[0] = -self.state.sigma_rate
+        targets[2:4] = -swings.real, -swings.imag
+        if self.final is not None:
+            targets[PLACE] = self.final - self.state.sigma - self.state.sigma_rate * durations
+        return targets
+
+    @property
+    def conditions(self) -> list[int]:
+        """Return which rows of the end are conditions."""
+        rows = range(len(self.target))
+        return [row for row in rows if row != PLACE or self.final is not None]
 
     @cached_property
     def programme(self) -> PeakProgramme:
@@ -124,11 +144,11 @@ class PeakProblem:
         by_sample = self.mode.end_rows(
             self.duration, pieces, insensitive=self.settings.insensitive
         )
-        rows = self.spline.gathered(by_sample)
+        rows = self.spline.gathered(by_sample[self.conditions])
         caps, offsets, limits = self._caps()
         return PeakProgramme(
             rows=rows[:, 1:-1],
-            target=self.target - rows[:, 0] * self.first_drive,
+            target=self.target[self.conditions] - rows[:, 0] * self.first_drive,
             caps=caps[:, 1:-1],
             cap_target=offsets + caps[:, 0] * self.first_drive,
             cap_limits=limits,
@@ -197,8 +217,10 @@ class PeakProblem:
             raise self._refusal()
         coefficients = np.concatenate([[self.first_drive], solution.coefficients, [0.0]])
         peak = float(np.abs(coefficients).max())
-        switching = SwitchingFunction(mode=self.mode, multipliers=solution.multipliers)
-        target = float(solution.multipliers @ self.target)
+        multipliers = np.zeros(len(self.target))
+        multipliers[self.conditions] = solution.multipliers
+        switching = SwitchingFunction(mode=self.mode, multipliers=multipliers)
+        target = float(multipliers @ self.target)
         # No effort is less than the one that acts at the start.
         first = abs(self.first_drive)
         proven = max(self.programme.proven_peak(solution), first)
@@ -206,6 +228,7 @@ class PeakProblem:
             problem=self,
             samples=self.spline.samples(coefficients),
             peak=peak,
+            inner_peak=float(np.abs(solution.coefficients).max()),
             least_peak=max(target / switching.magnitude(self.duration), first),
             optimality_residual=abs(peak / proven - 1.0),
             switching=switching,
@@ -237,6 +260,8 @@ class PeakMotion:
         Even samples of the drive, joined linearly, shape (m,).
     peak
         Largest magnitude of the drive: effort [N m], or acceleration of link n-1 [rad/s^2].
+    inner_peak
+        The same without the value at the start, which no motion can change.
     least_peak
         No drive whatsoever meets the conditions in this duration with less.
     optimality_residual
@@ -251,6 +276,7 @@ class PeakMotion:
     problem: PeakProblem
     samples: FloatArray
     peak: float
+    inner_peak: float
     least_peak: float
     optimality_residual: float
     switching: SwitchingFunction
@@ -269,7 +295,7 @@ class PeakMotion:
         jet = self.law.jet(self.law.knots, START_ORDERS - 1)
         jet[0] -= self.problem.place
         peaks = np.abs(jet).max(axis=1)
-        jet[0] -= self.problem.final
+        jet[0] -= jet[0, -1] if self.problem.final is None else self.problem.final
         return float((np.abs(jet[:, -1]) / peaks).max())
 
     @property
@@ -280,6 +306,32 @@ class PeakMotion:
         jet = law.jet(np.arange(pieces + 1.0) / pieces * law.duration, 3)
         sigma_rate = jet[1] + mode.relaxation * jet[2] + jet[3] / mode.frequency**2
         return float(np.abs(sigma_rate + mode.reaction * jet[3]).max())
+
+    @property
+    def least_duration(self) -> float:
+        """Return the duration below which no motion from rest to rest has as small a peak [s]."""
+        return self.switching.shortest_duration(self.target, self.peak, self.problem.duration)
+
+    def next_duration(self, peak: float) -> float:
+        """
+        Return the duration up to which the dual values rule out a peak [s].
+
+        Where this motion's own peak is less, the longest shorter one that they rule out. What the
+        spline lacks of the best of all drives hardly changes with the duration, and is allowed
+        for.
+        """
+        is_short = self.inner_peak > peak
+        ratio = STRIDE if is_short else 1.0 / BACK_STRIDE
+        durations = self.problem.duration * np.geomspace(1.0, ratio, PLACES)
+        needed = self.switching.multipliers @ self.problem.targets(durations)
+        reached = self.switching.magnitudes(durations)
+        excess = self.inner_peak * reached[0] / needed[0] * needed - peak * reached
+        beyond = np.flatnonzero((excess > 0.0) != is_short)
+        if not beyond.size:
+            return float(durations[-1])
+        last = max(int(beyond[0]), 1)
+        share = excess[last - 1] / (excess[last - 1] - excess[last])
+        return float(durations[last - 1] + share * (durations[last] - durations[last - 1]))
 
     @property
     def gap(self) -> float:

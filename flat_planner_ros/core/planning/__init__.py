@@ -35,6 +35,7 @@ from flat_planner_ros.core.planning.tradeoff import (
     baselines,
     duration_advice,
     residual_of_plan,
+    time_advice,
     tradeoff_points,
     TradeoffPoint,
 )
@@ -64,6 +65,7 @@ __all__ = [
     'shortest_plan',
     'stop_plan',
     'DurationRules',
+    'time_advice',
     'tradeoff_points',
     'TradeoffPoint',
     'ViaPoint',

@@ -190,6 +190,16 @@ class Plan:
         """Integral of Y^T Q Y over the motion, summed over the planned variables."""
         return self.trajectory.cost_value
 
+    @property
+    def least_duration(self) -> float | None:
+        """
+        Return the duration below which no motion has as small a peak effort of joint n-1 [s].
+
+        None where nothing proves one: for other strategies, and for starts in motion.
+        """
+        peak = self.trajectory.peak
+        return None if peak is None or self.request.start_jets is not None else peak.least_duration
+
     def sample(self, period: float) -> PlanSamples:
         """
         Return the plan on an even grid that contains both ends.

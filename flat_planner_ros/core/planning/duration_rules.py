@@ -30,7 +30,7 @@ from flat_planner_ros.core.planning.request import (
     RequestRejected,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
-from flat_planner_ros.core.planning.strategies import shortest_at_rest
+from flat_planner_ros.core.planning.strategies import shortest_known
 
 REASONS = {
     Quantity.POSITION: Reason.POSITION_LIMIT,
@@ -139,7 +139,7 @@ class DurationRules:
         # Joint n-1 alone has an effort that a strategy may know how to bring to its limit.
         limit = float(self.limits.effort[-2])
         if not is_prescribed:
-            bound = shortest_at_rest(request, arm, options, limit)
+            bound = shortest_known(request, arm, options, limit)
             return self._shortest(plan_of, self.shortest, bound=bound), None
         prescribed = plan(request, arm, options)
         use = self.limits.worst(prescribed)
@@ -148,7 +148,7 @@ class DurationRules:
         scales = self.on_violation is OnViolation.SCALE
         # To stretch is to take longer, even if something shorter obeys as well.
         shortest = request.duration if scales else self.shortest
-        bound = shortest_at_rest(request, arm, options, limit)
+        bound = shortest_known(request, arm, options, limit)
         found = self._shortest(plan_of, shortest, use, bound)
         if scales:
             return found, use

@@ -41,6 +41,7 @@ from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import path_of, plan
 from flat_planner_ros.core.planning.reference_trajectory import problem_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions, ViaPoint
+from flat_planner_ros.core.planning.strategies import OWN_LAWS
 import numpy as np
 
 LEAST_SHARE = 0.05
@@ -220,14 +221,22 @@ def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
 def _stop(running: Plan, pose: FloatArray, jets: FloatArray, duration: float) -> Plan:
     """Return the plan to rest of a given duration that costs least."""
 
-    def plan_to(values: FloatArray) -> Plan:
-        final = _pose(values)
-        request = MotionRequest(start=pose, final=final, duration=duration, start_jets=jets)
-        return plan(request, running.problem.arm, running.options)
+    def plan_to(values: FloatArray, options: PlanningOptions) -> Plan:
+        request = MotionRequest(
+            start=pose, final=_pose(values), duration=duration, start_jets=jets
+        )
+        return plan(request, arm, options)
 
+    arm, options = running.problem.arm, running.options
+    own = OWN_LAWS.get(options.strategy)
+    # Costates are those of a quadratic cost.
+    quadratic = options if own is None else replace(options, strategy=own.in_motion)
     here = jets[:, 0]
-    low, high = _end_costates(plan_to(here)), _end_costates(plan_to(here + PROBE))
-    return plan_to(here + PROBE * low / (low - high))
+    low, high = (_end_costates(plan_to(here + probe, quadratic)) for probe in (0.0, PROBE))
+    values = here + PROBE * low / (low - high)
+    if own is not None and own.stop is not None:
+        values[0] = own.stop(arm, options, duration, jets[0])
+    return plan_to(values, options)
 
 
 def _end_costates(planned: Plan) -> FloatArray:

@@ -166,7 +166,7 @@ def _with_own_law(
         final=np.array(final),
         edges=(0.0, problem.duration),
         own_cost=motion.cost,
-        knots=motion.knots,
+        peak=motion.peak,
     )
     unit = problem.unit
     return _Certified(
@@ -204,7 +204,7 @@ def _from_motion(
         final=final,
         edges=(0.0, problem.duration),
         own_cost=None if own is None else own.cost,
-        knots=None if own is None else own.knots,
+        peak=None if own is None else own.peak,
     )
     return _Certified(trajectory, boundary, optimality)
 

@@ -43,6 +43,7 @@ from flat_planner_ros.core.motion_law import (
     unit_motion,
     UnitMotion,
 )
+from flat_planner_ros.core.peak import PeakMotion
 from flat_planner_ros.core.planning.request import PlanningOptions
 import numpy as np
 
@@ -203,8 +204,12 @@ class ReferenceTrajectory(Protocol):
         """Return the times from the start to the end between which the laws are smooth [s]."""
 
     @property
+    def peak(self) -> PeakMotion | None:
+        """Return what the first law is, if it has the least peak."""
+
+    @property
     def knots(self) -> FloatArray | None:
-        """Return even times between which the laws are smooth, as `LawTrajectory.knots`."""
+        """Return the even times between which the laws are smooth, ends included; else None."""
 
     @property
     def cost_value(self) -> float:
@@ -254,6 +259,10 @@ class RestToRestTrajectory:
     def edges(self) -> tuple[float, ...]:
         """Return start and end of the motion [s]."""
         return 0.0, self.problem.duration
+
+    @property
+    def peak(self) -> None:
+        """Return that no law has the least peak."""
 
     @property
     def knots(self) -> None:
@@ -319,9 +328,8 @@ class LawTrajectory:
         Times from the start to the end between which the laws are smooth [s].
     own_cost
         Cost of laws that minimise something other than the problem's; None where they do not.
-    knots
-        Even times between which laws with an effort linear in pieces are smooth, both ends
-        included, shape (m,) [s]; None for laws that are smooth between the edges.
+    peak
+        Motion whose law is the first one, if its effort has the least peak.
 
     """
 
@@ -331,7 +339,12 @@ class LawTrajectory:
     final: FloatArray
     edges: tuple[float, ...]
     own_cost: float | None = None
-    knots: FloatArray | None = None
+    peak: PeakMotion | None = None
+
+    @property
+    def knots(self) -> FloatArray | None:
+        """Return the even times between which the laws are smooth, ends included; else None."""
+        return None if self.peak is None else self.peak.law.knots
 
     @cached_property
     def cost_value(self) -> float:
@@ -362,10 +375,11 @@ class LawTrajectory:
 
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
-        if self.knots is not None:
+        knots = self.knots
+        if knots is not None:
             nodes, shares = np.polynomial.legendre.leggauss(NODES_PER_PIECE)
-            lengths = np.diff(self.knots)
-            times = self.knots[:-1, None] + 0.5 * np.multiply.outer(lengths, nodes + 1.0)
+            lengths = np.diff(knots)
+            times = knots[:-1, None] + 0.5 * np.multiply.outer(lengths, nodes + 1.0)
             weights = np.multiply.outer(lengths, shares) / (2.0 * self.problem.duration)
             return times.ravel(), weights.ravel()
         places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])

@@ -31,6 +31,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from flat_planner_ros.core.arm import (
+    apply_row,
     Drive,
     flat_map,
     FlatModel,
@@ -46,6 +47,7 @@ from flat_planner_ros.core.peak import (
     peak_motion_from,
     PeakMotion,
     shortest_peak_duration,
+    shortest_peak_duration_from,
 )
 from flat_planner_ros.core.planning.request import MotionRequest, planned_at_rest, PlanningOptions
 
@@ -70,9 +72,8 @@ class OwnMotion:
         What it minimises.
     boundary_residual, optimality_residual
         As a plan states them [-].
-    knots
-        Even times between which the law is smooth, both ends included, which every sampled
-        command has to contain, shape (m,) [s]; None where any times will do.
+    peak
+        The same as a motion of least peak, with its dual certificate; None where it is none.
 
     """
 
@@ -80,7 +81,7 @@ class OwnMotion:
     cost: float
     boundary_residual: float
     optimality_residual: float
-    knots: FloatArray | None = None
+    peak: PeakMotion | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,10 +102,16 @@ class OwnLaw:
         `in_motion` stands in.
     in_motion
         Strategy of the same cost, which stands in where the start is in motion.
+    stop
+        From the arm, the options, the duration [s] and the derivatives at the start, as above, to
+        the place where a stop takes least [rad]; None where that of `in_motion` serves.
     shortest
         From the arm, the options, the distance [rad] and the limit on the effort of joint n-1
         [N m] to the shortest duration from rest to rest within it [s]; None where a search has to
         find it.
+    shortest_from
+        The same from the derivatives at the start and the value at the end in place of the
+        distance.
 
     """
 
@@ -114,7 +121,11 @@ class OwnLaw:
         Callable[[PlanarArm, PlanningOptions, float, FloatArray, float], OwnMotion] | None
     ) = None
     in_motion: Strategy = Strategy.POLYNOMIAL
+    stop: Callable[[PlanarArm, PlanningOptions, float, FloatArray], float] | None = None
     shortest: Callable[[PlanarArm, PlanningOptions, float, float], float] | None = None
+    shortest_from: (
+        Callable[[PlanarArm, PlanningOptions, FloatArray, float, float], float] | None
+    ) = None
 
 
 def _insensitive(
@@ -160,6 +171,14 @@ def _least_peak_from(
     return _of_peak(found, found.peak)
 
 
+def _least_peak_stop(
+    arm: PlanarArm, options: PlanningOptions, duration: float, start: FloatArray
+) -> float:
+    """Return where a motion comes to rest with the least peak."""
+    found = peak_motion_from(arm, duration, options.peak, start, None, options.drive)
+    return float(found.law.jet(duration, 0)[0, 0])
+
+
 def _of_peak(found: PeakMotion, cost: float) -> OwnMotion:
     """Return a motion of least peak as one of a strategy."""
     return OwnMotion(
@@ -167,7 +186,7 @@ def _of_peak(found: PeakMotion, cost: float) -> OwnMotion:
         cost=cost,
         boundary_residual=found.boundary_residual,
         optimality_residual=found.optimality_residual,
-        knots=found.law.knots,
+        peak=found,
     )
 
 
@@ -184,6 +203,13 @@ def _shortest_least_peak(
     return shortest_peak_duration(arm, options.peak, distance, limit)
 
 
+def _shortest_least_peak_from(
+    arm: PlanarArm, options: PlanningOptions, start: FloatArray, final: float, limit: float
+) -> float:
+    """Return the same from a start in motion."""
+    return shortest_peak_duration_from(arm, options.peak, start, final, limit)
+
+
 OWN_LAWS: Mapping[Strategy, OwnLaw] = MappingProxyType(
     {
         Strategy.INSENSITIVE: OwnLaw(motion=_insensitive, check=_check_insensitive),
@@ -191,18 +217,20 @@ OWN_LAWS: Mapping[Strategy, OwnLaw] = MappingProxyType(
             motion=_least_peak,
             check=_check_least_peak,
             motion_from=_least_peak_from,
+            stop=_least_peak_stop,
             shortest=_shortest_least_peak,
+            shortest_from=_shortest_least_peak_from,
         ),
     }
 )
 """Strategies that are more than a quadratic cost."""
 
 
-def shortest_at_rest(
+def shortest_known(
     request: MotionRequest, arm: PlanarArm, options: PlanningOptions, limit: float
 ) -> float | None:
     """
-    Return the duration below which no motion from rest to rest keeps a limit.
+    Return the duration below which no motion of a strategy keeps a limit.
 
     Parameters
     ----------
@@ -214,18 +242,26 @@ def shortest_at_rest(
     Returns
     -------
     float | None
-        None where nobody knows one: for other strategies, starts in motion, and where the effort
-        is not what the strategy shapes.
+        None where nobody knows one: for other strategies, and where the effort is not what the
+        strategy shapes.
 
     """
     own = OWN_LAWS.get(options.strategy)
     is_shaped = options.drive is Drive.EFFORT and not options.compensate_friction
     if own is None or own.shortest is None or not is_shaped or not 0.0 < limit < inf:
         return None
-    if request.start_jets is not None or request.via:
+    final = planned_at_rest(request.final)[0]
+    if request.via or options.flat_model is not FlatModel.EXACT:
         return None
-    distance = planned_at_rest(request.final)[0] - planned_at_rest(request.start)[0]
-    return own.shortest(arm, options, abs(distance), limit) if distance else None
+    if request.start_jets is None:
+        distance = final - planned_at_rest(request.start)[0]
+        return own.shortest(arm, options, abs(distance), limit) if distance else None
+    start = request.start_jets[0]
+    effort = abs(float(apply_row(flat_map(arm).effort, start[:5, None])[0]))
+    is_at_rest = start[0] == final and not start[1:].any()
+    if own.shortest_from is None or effort >= limit or is_at_rest:
+        return None
+    return own.shortest_from(arm, options, start, final, limit)
 
 
 def check_options(arm: PlanarArm, options: PlanningOptions) -> None:

@@ -40,6 +40,7 @@ from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
+from flat_planner_ros.core.planning.strategies import shortest_known
 import numpy as np
 
 INTERVALS = 1000
@@ -57,6 +58,9 @@ STRETCHES = (1.05, 1.1, 1.2)
 
 PAYS = 0.5
 """Share of the worst residual, or less, that must be left for a stretch to pay [-]."""
+
+WORTHWHILE = 0.95
+"""Share of the duration, or less, that another strategy must take to be advised [-]."""
 
 NOTICEABLE = 1e-3
 """Worst residual below which there is nothing to advise [rad]."""
@@ -169,6 +173,31 @@ def duration_advice(planned: Plan, residual: PredictedResidual) -> str | None:
             f'from {residual.worst:.2g} to {left.worst:.2g} rad'
         )
     return line
+
+
+def time_advice(planned: Plan) -> str | None:
+    """
+    Return a line on the time that the strategy of least peak would save at the same peak effort.
+
+    Parameters
+    ----------
+    planned
+        A motion from rest to rest without via points that took the shortest duration within the
+        limits; for any other there is no advice.
+
+    """
+    request, arm = planned.request, planned.problem.arm
+    options = replace(planned.options, strategy=Strategy.MIN_PEAK_EFFORT)
+    peak = float(planned.peak_effort[-2])
+    if planned.options.strategy is Strategy.MIN_PEAK_EFFORT:
+        return None
+    try:
+        duration = shortest_known(request, arm, options, peak)
+    except FlatPlannerError:
+        return None
+    if duration is None or duration > WORTHWHILE * request.duration:
+        return None
+    return f'strategy min_peak_effort takes {duration:.4g} s with the same peak effort'
 
 
 def baselines(planned: Plan) -> tuple[TradeoffPoint, ...]:

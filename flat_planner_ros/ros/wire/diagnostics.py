@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.insensitive import PredictedResidual
 from flat_planner_ros.core.monitor import (
     ActuatedJoints,
     Adoption,
@@ -31,6 +32,7 @@ from flat_planner_ros.core.planning import (
     duration_advice,
     RequestRejected,
     residual_of_plan,
+    time_advice,
 )
 from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, Shortfall
 from flat_planner_ros.ros.wire.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
@@ -126,6 +128,7 @@ def accepted_status(
         'boundary_residual': plan.boundary_residual,
         'optimality_residual': plan.optimality_residual,
         'cost': plan.cost_value,
+        'duration_bound': plan.least_duration,
         **_residual_values(motion, with_advice=with_advice, with_baselines=with_baselines),
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
@@ -360,7 +363,7 @@ def _residual_values(motion: Motion, *, with_advice: bool, with_baselines: bool)
         'predicted_residual_worst': residual.worst,
         'predicted_residual_box': str(residual.box),
         'predicted_miss_worst': residual.miss or None,
-        'advice': duration_advice(motion.plan, residual) if with_advice else None,
+        'advice': _advice(motion, residual) if with_advice else None,
     }
     if with_baselines:
         for point in baselines(motion.plan):
@@ -368,6 +371,14 @@ def _residual_values(motion: Motion, *, with_advice: bool, with_baselines: bool)
             values[f'baseline.{point.series}.residual'] = point.nominal
             values[f'baseline.{point.series}.residual_worst'] = point.worst
     return values
+
+
+def _advice(motion: Motion, residual: PredictedResidual) -> str | None:
+    """Return in one line what would pay, None if nothing would."""
+    lines = [duration_advice(motion.plan, residual)]
+    if motion.is_shortest:
+        lines.append(time_advice(motion.plan))
+    return '; '.join(line for line in lines if line) or None
 
 
 def _joint_values(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:

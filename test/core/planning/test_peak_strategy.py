@@ -17,7 +17,11 @@
 from math import inf, pi
 
 from flat_planner_ros.core.arm import Drive, FlatModel, InvalidRequest, PlanarArm
-from flat_planner_ros.core.peak import PeakSettings
+from flat_planner_ros.core.peak import (
+    peak_motion_from,
+    PeakSettings,
+    shortest_peak_duration_from,
+)
 from flat_planner_ros.core.planning import (
     check_options,
     DurationRules,
@@ -29,6 +33,7 @@ from flat_planner_ros.core.planning import (
     PlanningOptions,
     Quantity,
     RequestRejected,
+    stop_plan,
     Strategy,
     ViaPoint,
 )
@@ -140,6 +145,17 @@ def test_takes_over_from_a_running_motion(final):
     assert found.duration < others
 
 
+@pytest.mark.parametrize('time', [0.1, 0.5, 0.8])
+@pytest.mark.parametrize('final', [pi, -1.0, 20.0])
+def test_dual_values_find_the_duration_that_a_search_finds(time, final):
+    running = shortest(effort=[LIMIT, inf])
+    jets = running.at(np.array([time])).planned[:, :6, 0]
+    found = shortest_peak_duration_from(ARM, PeakSettings(), jets[0], final, LIMIT)
+    for share, obeys in ((1.0, True), (0.999, False), (0.95, False), (0.8, False)):
+        motion = peak_motion_from(ARM, share * found, PeakSettings(), jets[0], final)
+        assert (motion.inner_peak <= LIMIT) == obeys
+
+
 def test_arms_of_more_joints_move_in_synchrony():
     arm = PlanarArm.reduced(
         inertia_star=(6.4e-4, 3.3e-5),
@@ -188,3 +204,23 @@ def test_a_servo_has_the_least_acceleration():
     peaks = [np.abs(p.sample(1e-3).accelerations[:, 0]).max() for p in (by_effort, by_servo)]
     assert peaks[1] < peaks[0]
     assert by_servo.peak_effort[0] > by_effort.peak_effort[0]
+
+
+def test_a_stop_is_where_the_least_peak_leads():
+    running = plan(request(), ARM, OPTIONS)
+    time = 0.45
+    now = running.at(np.array([time]))
+    found = stop_plan(running, now.positions[0], now.planned[:, :6, 0], 1.0 - time)
+    assert found.options.strategy is Strategy.MIN_PEAK_EFFORT
+    assert found.duration < 0.9 * (1.0 - time)
+    end = found.sample(0.005)
+    assert (end.velocities[-1] == 0.0).all()
+    # Nowhere else does it take less.
+    for shift in (-0.05, 0.05):
+        elsewhere = MotionRequest(
+            start=now.positions[0],
+            final=found.request.final + np.array([shift, 0.0]),
+            duration=found.duration,
+            start_jets=now.planned[:, :6, 0],
+        )
+        assert plan(elsewhere, ARM, OPTIONS).cost_value > found.cost_value * (1.0 - 1e-9)
