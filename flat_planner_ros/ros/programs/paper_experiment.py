@@ -266,14 +266,21 @@ class Experimenter(Node):
             start = stamps.seconds(self._states[-1].header.stamp) + self._lead
             self._verdicts.clear()
             self._goals.publish(_goal(start))
-            self._await(lambda: bool(self._verdicts), 'no verdict on the goal')
-            verdict = self._verdicts[0].status[0]
+            self._await(lambda: self._verdict() is not None, 'no verdict on the goal')
+            verdict = self._verdict()
             values = {pair.key: pair.value for pair in verdict.values}
             if values['state'] == 'ACCEPTED':
                 return start
             if values['error_name'] not in PASSING or monotonic() > deadline:
                 raise ExperimentFailed(f'the goal was rejected: {verdict.message}')
             self._spin_until(lambda: False, PAUSE)
+
+    def _verdict(self) -> Any:
+        """Return the verdict on a goal, None before; what became of the last motion is none."""
+        for status in (status for msg in self._verdicts for status in msg.status):
+            if any(pair.value in ('ACCEPTED', 'REJECTED') for pair in status.values):
+                return status
+        return None
 
     def _call(self, client: Client, request: Any) -> Any:
         """Return the answer of a service."""
