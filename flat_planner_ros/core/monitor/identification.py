@@ -20,7 +20,8 @@ from math import hypot, pi, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
-from flat_planner_ros.core.monitor.oscillation import basis_columns, OscillationFit, solve_linear
+from flat_planner_ros.core.monitor.damped_columns import basis_columns, solve_linear
+from flat_planner_ros.core.monitor.oscillation import OscillationFit
 import numpy as np
 from numpy.typing import ArrayLike
 

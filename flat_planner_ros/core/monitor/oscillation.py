@@ -20,11 +20,14 @@ from math import exp, hypot, log, pi, sqrt
 from typing import Any, NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.core.monitor.damped_columns import (
+    basis_columns,
+    rate_columns,
+    ROUNDOFF,
+    solve_linear,
+)
 import numpy as np
 from numpy.typing import ArrayLike
-
-ROUNDOFF = 4.0 * float(np.finfo(float).eps)
-"""Size of rounding errors relative to the largest value [-]."""
 
 SEARCH_PERIODS = 0.5
 """Lowest frequency searched, so that slower signals are seen to be slower [periods]."""
@@ -43,6 +46,9 @@ SPECTRUM_SAMPLES = 2**15
 
 SPECTRUM_PADDING = 4
 """Zero padding of the spectrum relative to the signal's length [-]."""
+
+SCAN_STEP = pi / 4
+"""Step of the search in a band, an eighth of a period over the samples [-]."""
 
 CANDIDATES = 2
 """Number of the spectrum's peaks from which the fit is started [-]."""
@@ -69,29 +75,6 @@ LATE_LIMIT = 3.0
 """Largest decay between the end of the motion and the first sample, as exponent [-]."""
 
 
-def basis_columns(u: FloatArray, rates: FloatArray) -> FloatArray:
-    """Return the linear unknowns' columns for rates (w, s) per unit of u: (m, 4)."""
-    w, s = rates
-    envelope = np.exp(-s * u)
-    columns = (np.ones_like(u), u - 0.5, envelope * np.cos(w * u), envelope * np.sin(w * u))
-    return np.stack(columns, axis=-1)
-
-
-def rate_columns(u: FloatArray, basis: FloatArray, linear: FloatArray) -> FloatArray:
-    """Return the derivatives of the fitted signal with respect to (w, s): (m, 2)."""
-    cosine, sine = basis[:, 2], basis[:, 3]
-    a, b = linear[2], linear[3]
-    return np.stack((u * (b * cosine - a * sine), -u * (a * cosine + b * sine)), axis=-1)
-
-
-def solve_linear(basis: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the orthonormal columns (m, 4) and the linear unknowns (4,) of least squares."""
-    q, r = np.linalg.qr(basis)
-    # A decay within one long gap leaves an empty column: any finite unknown will do for it.
-    np.fill_diagonal(r, np.where(np.abs(np.diagonal(r)) < ROUNDOFF, 1.0, np.diagonal(r)))
-    return q, np.linalg.solve(r, q.T @ y)
-
-
 def _starts(u: FloatArray, y: FloatArray) -> FloatArray:
     """Return undamped starts at the highest peaks of the resampled signal's spectrum: (c, 2)."""
     count = int(min(round(1.0 / float(np.median(np.diff(u)))) + 1, SPECTRUM_SAMPLES))
@@ -110,7 +93,18 @@ def _starts(u: FloatArray, y: FloatArray) -> FloatArray:
     return np.stack((w, np.zeros_like(w)), axis=-1)
 
 
-def best_rates(u: FloatArray, y: FloatArray) -> FloatArray:
+def _scanned(u: FloatArray, y: FloatArray, lowest: float, highest: float) -> FloatArray:
+    """Return undamped starts at the best angular frequencies of a band: (c, 2)."""
+    w = np.arange(lowest, highest, SCAN_STEP)
+    rates = np.stack((w, np.zeros_like(w)), axis=-1)
+    residual, _ = _separable(u, y)
+    order = np.argsort([float(left @ left) for left in map(residual, rates)])
+    return rates[order[:CANDIDATES]]
+
+
+def best_rates(
+    u: FloatArray, y: FloatArray, band: tuple[float, float] | None = None
+) -> FloatArray:
     """
     Return the rates of the oscillation that fits best beside a straight line.
 
@@ -120,6 +114,9 @@ def best_rates(u: FloatArray, y: FloatArray) -> FloatArray:
         Times scaled to 0 ... 1 [-], ascending, shape (m,).
     y
         Values of the order of one [-], shape (m,).
+    band
+        Lowest and highest angular frequency per unit of u [-]; all that the samples can show
+        without.
 
     Returns
     -------
@@ -130,7 +127,10 @@ def best_rates(u: FloatArray, y: FloatArray) -> FloatArray:
     highest = max(NYQUIST_SHARE * pi / float(np.median(np.diff(u))), 2 * pi)
     lower = np.array((2 * pi * SEARCH_PERIODS, -GROWTH_LIMIT))
     upper = np.array((highest, DAMPING_LIMIT * highest))
-    starts = np.clip(_starts(u, y), lower, upper)
+    starts = _starts(u, y) if band is None else _scanned(u, y, *band)
+    if band is not None:
+        lower[0], upper[0] = band
+    starts = np.clip(starts, lower, upper)
     results = [_descend(u, y, start, lower, upper) for start in starts]
     best = min(results, key=lambda result: float(result.cost))
     return np.asarray(best.x, dtype=float)
@@ -222,7 +222,13 @@ class OscillationFit:
     reason: str = ''
 
 
-def fit_oscillation(times: ArrayLike, values: ArrayLike, end_time: float) -> OscillationFit:
+def fit_oscillation(
+    times: ArrayLike,
+    values: ArrayLike,
+    end_time: float,
+    *,
+    band: tuple[float, float] | None = None,
+) -> OscillationFit:
     """
     Fit bias, drift and one free damped oscillation to samples.
 
@@ -239,6 +245,9 @@ def fit_oscillation(times: ArrayLike, values: ArrayLike, end_time: float) -> Osc
         Samples [rad], shape (m,).
     end_time
         End of the motion T, where the amplitude is taken [s].
+    band
+        Lowest and highest damped frequency to be looked for [Hz]; by default all up to half the
+        sampling rate.
 
     Returns
     -------
@@ -288,7 +297,9 @@ def fit_oscillation(times: ArrayLike, values: ArrayLike, end_time: float) -> Osc
     if scale <= rounding:
         return still
     u, y = (t - t[0]) / span, (q - offset) / scale
-    return _fit_scaled(_Scaled(u, y, float(t[0]), span, offset, scale, rounding / scale), still)
+    return _fit_scaled(
+        _Scaled(u, y, float(t[0]), span, offset, scale, rounding / scale), still, band
+    )
 
 
 class _Scaled(NamedTuple):
@@ -303,9 +314,13 @@ class _Scaled(NamedTuple):
     rounding: float
 
 
-def _fit_scaled(samples: _Scaled, still: OscillationFit) -> OscillationFit:
+def _fit_scaled(
+    samples: _Scaled, still: OscillationFit, band: tuple[float, float] | None
+) -> OscillationFit:
     """Return the best oscillation, or the straight line and what speaks against more."""
-    rates = best_rates(samples.u, samples.y)
+    turn = 2 * pi * samples.span
+    scaled = None if band is None else (turn * band[0], turn * band[1])
+    rates = best_rates(samples.u, samples.y, scaled)
     basis = basis_columns(samples.u, rates)
     linear, left = _least_squares(basis, samples.y)
     line, left_by_line = _least_squares(basis[:, :2], samples.y)

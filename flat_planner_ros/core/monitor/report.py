@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.monitor.arrival import judge_arrival
-from flat_planner_ros.core.monitor.course import compare, Course
+from flat_planner_ros.core.monitor.course import compare, Course, judge_arrival
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion
-from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
+from flat_planner_ros.core.monitor.oscillation import OscillationFit
+from flat_planner_ros.core.monitor.sampling import doubt_of_times, seen_oscillation
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import SampleClock
 import numpy as np
@@ -148,11 +148,12 @@ def assess(
     done = clock.carried_out(motion, course)
     times, rows = measured.positions(done.end, until)
     errors = rows - motion.final
-    doubt = _doubt(course, clock)
+    doubt = _doubt(course, clock) or doubt_of_times(times)
+    foreign = ''
     if doubt:
         fit = OscillationFit(samples=times.size, reason=doubt)
     else:
-        fit = fit_oscillation(times, errors[:, -1], done.end)
+        fit, foreign = seen_oscillation(times, errors[:, -1], done.end, settings)
     estimate = _estimate(times - done.end, errors, fit, settings)
     frequency = fit.frequency or settings.expected_frequency
     settling = _settling_time(times - done.end, errors[:, -1], settings.settling_band, frequency)
@@ -179,9 +180,12 @@ def assess(
             _effort_remark(motion.joint_names, rms),
             _estimate_remark(estimate, fit),
         )
-    sentence = (clock.remark(course), arrival.remark, _verdict(fit, settings), *remarks)
+    severity = Level.worst(
+        (arrival.level, _level(fit, settings), Level.WARN if foreign else Level.OK)
+    )
+    sentence = (clock.remark(course), arrival.remark, foreign, _verdict(fit, settings), *remarks)
     return VibrationReport(
-        level=Level.STALE if stale else Level.worst((arrival.level, _level(fit, settings))),
+        level=Level.STALE if stale else severity,
         message='; '.join(filter(None, sentence)),
         start_time=motion.start,
         end_time=motion.end,
