@@ -144,8 +144,16 @@ def record_motion(graph, path: Path) -> list[DiagnosticArray]:
     graph.publish('/flat_planner/goal', goal(1.0, 0.5), readers=2)
     graph.expect(lambda: reports, 'a report')
     graph.expect(lambda: set(Recording(path).topics) >= OURS, 'all topics')
+    judged = float(values(reports[0])['end_time']) + WINDOW
+    graph.expect(lambda: last_state(path) >= judged, 'the samples that the report rests on')
     graph.remove(recorder)
     return reports
+
+
+def last_state(path: Path) -> float:
+    """Return the time of the last joint state that has been recorded [s]."""
+    *_, last = Recording(path).entries({'/joint_states'})
+    return stamps.seconds(deserialize_message(last.message, JointState).header.stamp)
 
 
 def test_three_nodes_are_recorded_and_judged_again(graph, tmp_path, capsys):
