@@ -256,7 +256,7 @@ def test_goals_leave_no_memory_behind(graph):
             # Straight to the node.
             for final in (random.uniform(0.5, 3.0), -1.0):
                 data = serialize_message(goal(1.0, final))
-                goals.node._answer(lambda: goal_from_trajectory(data))
+                goals.node._answer(lambda data=data: goal_from_trajectory(data))
             goals.node._report_ended()
 
     send(300)
