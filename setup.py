@@ -52,6 +52,8 @@ setup(
         ],
         'record': ['mcap>=1.6,<2', 'rosbags>=0.10,<0.12', 'zstandard>=0.22,<1'],
         'live': ['aiohttp>=3.9,<4'],
+        # Completion of the programs' options in a shell.
+        'complete': ['argcomplete>=3,<4'],
         'plot': ['matplotlib>=3.6,<4'],
         # What benchmarks/ compares with; each may be missing.
         'bench': [

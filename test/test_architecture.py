@@ -322,7 +322,7 @@ def test_what_is_imported_is_declared():
     declared |= set().union(
         *(
             distributions(setup_arguments()['extras_require'][extra])
-            for extra in ('record', 'live')
+            for extra in ('record', 'live', 'complete')
         )
     )
     used = set().union(*map(roots, [*PACKAGE.rglob('*.py'), *CHECKOUT.glob('launch/*.py')]))

@@ -26,6 +26,7 @@ from threading import Event
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.programs import SIGNALS
 from flat_planner_ros.ros.nodes.introduction import introduce
+from flat_planner_ros.version import version_line
 import rclpy
 from rclpy.exceptions import NotInitializedException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
@@ -155,10 +156,11 @@ def _init(args: Sequence[str] | None) -> None:
 def _refuse_strays(args: Sequence[str]) -> None:
     """Explain the command line, and end with exit code 2, if there is more than ROS arguments."""
     parser = ArgumentParser(
-        usage='%(prog)s [-h] [--ros-args ...]',
+        usage='%(prog)s [-h] [--version] [--ros-args ...]',
         description='A node of flat_planner_ros; it runs until Ctrl-C.',
         epilog='ROS arguments follow --ros-args, e.g. --ros-args --params-file arm.yaml',
     )
+    parser.add_argument('--version', action='version', version=version_line())
     parser.parse_args(remove_ros_args(list(args))[1:])
 
 

@@ -16,7 +16,9 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import replace
+from functools import partial
 import json
 from pathlib import Path
 import sys
@@ -26,7 +28,20 @@ from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import MonitorSettings
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
-from flat_planner_ros.ros.programs.command_line import explain_missing, missing_for_plot
+from flat_planner_ros.ros.programs.command_line import (
+    explain_missing,
+    explain_os,
+    figure_name,
+    missing_for_plot,
+    parsed,
+)
+from flat_planner_ros.ros.programs.outputs import (
+    NotWritten,
+    open_text,
+    STANDARD_OUTPUT,
+    summary_stream,
+    write_through,
+)
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 from flat_planner_ros.ros.wire.message_types import message_class
 from rclpy.serialization import deserialize_message
@@ -72,7 +87,7 @@ def main(args: Sequence[str] | None = None) -> int:
         0 with at least one report, 1 without.
 
     """
-    options = _parser().parse_args((sys.argv if args is None else args)[1:])
+    options = parsed(_parser(), (sys.argv if args is None else args)[1:], ['json', 'plot'])
     if missing := missing_for_plot(options.plot):
         print(missing, file=sys.stderr)
         return 1
@@ -92,11 +107,18 @@ def main(args: Sequence[str] | None = None) -> int:
         settings = _settings(options, recording, sources)
         remarks: list[str] = []
         judgements = replay(recording, sources, settings, remarks.append)
-        _tell(options, recording, sources, judgements, remarks)
+        reports = [_as_dict(judgement) for judgement in judgements]
+        if options.json is not None:
+            _write_json(options, recording, sources, reports, remarks)
+        with redirect_stdout(summary_stream(options.json, options.plot)):
+            _tell(options, recording, sources, reports, remarks)
         if options.plot is not None:
             _draw(judgements, options.plot)
-    except (FlatPlannerError, OSError) as error:
+    except FlatPlannerError as error:
         print(f'analyse: {error}', file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f'analyse: {explain_os(error)}', file=sys.stderr)
         return 1
     return 0 if judgements else 1
 
@@ -111,9 +133,12 @@ def _parser() -> ArgumentParser:
     parser.add_argument(
         'file', metavar='FILE', type=Path, help='MCAP file, or what ros2 bag has written'
     )
-    parser.add_argument('--json', action='store_true', help='print the reports as JSON')
+    parser.add_argument('--json', metavar='FILE', help='the reports as JSON, or -')
     parser.add_argument(
-        '--plot', metavar='FILE.png', type=Path, help='draw the motions, a file for each'
+        '--plot',
+        metavar='FILE',
+        type=figure_name,
+        help='the motions, .png, .pdf or .svg; several as FILE-1, FILE-2 …; - for the only one',
     )
     parser.add_argument(
         '--params-file',
@@ -149,27 +174,35 @@ def _settings(
     return known
 
 
+def _write_json(
+    options: Namespace,
+    recording: 'Recording',
+    sources: 'Sources',
+    reports: Sequence[Mapping[str, Any]],
+    remarks: Sequence[str],
+) -> None:
+    """Write the reports as JSON."""
+    document = {
+        'file': str(options.file),
+        'plan': sources.plan,
+        'joint_states': sources.joint_states,
+        'damage': recording.damage,
+        'remarks': list(remarks),
+        'reports': list(reports),
+    }
+    with open_text(options.json) as file:
+        print(json.dumps(document, indent=2, allow_nan=False), file=file)
+
+
 def _tell(
     options: Namespace,
     recording: 'Recording',
     sources: 'Sources',
-    judgements: Sequence['Judgement'],
+    reports: Sequence[Mapping[str, Any]],
     remarks: Sequence[str],
 ) -> None:
     """Print the reports."""
-    reports = [_as_dict(judgement) for judgement in judgements]
     differences = _compared(reports, _recorded_reports(recording, sources))
-    if options.json:
-        document = {
-            'file': str(options.file),
-            'plan': sources.plan,
-            'joint_states': sources.joint_states,
-            'damage': recording.damage,
-            'remarks': list(remarks),
-            'reports': reports,
-        }
-        print(json.dumps(document, indent=2, allow_nan=False))
-        return
     print(f'{options.file}: plans from {sources.plan}, joint states from {sources.joint_states}')
     if recording.damage:
         print(f'the recording is cut short or damaged: {recording.damage}')
@@ -264,21 +297,25 @@ def _shown(value: bool | int | float | str) -> str:
     return f'{value:.6g}' if isinstance(value, float) else str(value)
 
 
-def _draw(judgements: Sequence['Judgement'], path: Path) -> None:
+def _draw(judgements: Sequence['Judgement'], file: str) -> None:
     """Draw each motion into a file of its own."""
     # Imported here: matplotlib is an extra.
     from flat_planner_ros.figures.analysis_figure import draw
 
+    if file == STANDARD_OUTPUT and len(judgements) > 1:
+        raise NotWritten(f'{len(judgements)} motions are as many figures: --plot needs a name')
     for number, judgement in enumerate(judgements, 1):
-        name = path if len(judgements) == 1 else path.with_stem(f'{path.stem}-{number}')
-        draw(
+        path = Path(file)
+        name = file if len(judgements) == 1 else str(path.with_stem(f'{path.stem}-{number}'))
+        drawn = partial(
+            draw,
             judgement.report,
             judgement.motion,
             judgement.times,
             judgement.positions,
             judgement.efforts,
-            name,
         )
+        write_through(name, drawn, '.png')
         print(f'figure: {name}', file=sys.stderr)
 
 

@@ -12,12 +12,132 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Shared by the optional programs: their command lines, and a word on missing libraries."""
+"""
+The one grammar of the programs' command lines, and a word on missing libraries.
 
-from collections.abc import Sequence
+`JOINT=RAD` is the angle of a joint, `--params-file` a parameter file, `--plot` a figure, `-`
+standard output, wherever they occur.
+"""
+
+from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
+import os
 from pathlib import Path
 import sys
+from typing import Any
+
+from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.ros.programs.outputs import STANDARD_OUTPUT
+from flat_planner_ros.version import version_line
+
+FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
+"""Suffixes of figures, which decide what is drawn."""
+
+COMPLETION = '_ARGCOMPLETE'
+"""Environment variable that a shell sets when it asks for completions."""
+
+
+def parsed(
+    parser: ArgumentParser, args: Sequence[str] | None, outputs: Sequence[str] = ()
+) -> Namespace:
+    """
+    Return the options on a command line, of a parser that gets `--version` and completion.
+
+    Parameters
+    ----------
+    parser
+        Parser of all options but `--version`.
+    args
+        Command line without the program's name; the process's own by default.
+    outputs
+        Names of the options that name outputs, of which one may be `-`.
+
+    """
+    parser.add_argument('--version', action='version', version=version_line())
+    if COMPLETION in os.environ and find_spec('argcomplete') is not None:
+        # Imported here: argcomplete is an extra.
+        from argcomplete import autocomplete
+
+        autocomplete(parser)
+    options = parser.parse_args(args)
+    if [getattr(options, name) for name in outputs].count(STANDARD_OUTPUT) > 1:
+        parser.error('only one output can be -, standard output')
+    return options
+
+
+class JointAngles(Action):
+    """Collects angles by joint; a joint that is given twice is an error with its name."""
+
+    def __call__(
+        self,
+        parser: ArgumentParser,
+        namespace: Namespace,
+        values: Any,
+        _option: str | None = None,
+    ) -> None:
+        """Take the angles of one occurrence."""
+        try:
+            known = getattr(namespace, self.dest) or {}
+            setattr(namespace, self.dest, by_joint([*known.items(), *values]))
+        except ArgumentTypeError as error:
+            parser.error(f'{" ".join(self.option_strings) or "goal"}: {error}')
+
+
+def joint_angle(text: str) -> tuple[str, float]:
+    """Return a joint and its angle [rad] of `JOINT=RAD`."""
+    name, separator, value = text.partition('=')
+    try:
+        if name and separator:
+            return name, float(value)
+    except ValueError:
+        pass
+    raise ArgumentTypeError(f'{text!r} is not JOINT=RAD, e.g. joint1=1.57')
+
+
+def by_joint(angles: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Return angles by joint [rad]; ArgumentTypeError names a joint that is given twice."""
+    found: dict[str, float] = {}
+    for name, angle in angles:
+        if name in found:
+            raise ArgumentTypeError(f'{name} is given twice: {found[name]:g} and {angle:g}')
+        found[name] = angle
+    return found
+
+
+def pose_of(angles: Mapping[str, float], joints: Sequence[str], what: str) -> list[float]:
+    """
+    Return the angles of all joints, 0 where none is given [rad].
+
+    Raises
+    ------
+    FlatPlannerError
+        The arm has no such joint; the message begins with `what`.
+
+    """
+    for name in angles:
+        if name not in joints:
+            raise FlatPlannerError(
+                f'{what}: unknown joint {name!r}; the arm has {", ".join(joints)}'
+            )
+    return [angles.get(name, 0.0) for name in joints]
+
+
+def figure_name(text: str) -> str:
+    """Return the name of a figure whose suffix says what to draw."""
+    if text == STANDARD_OUTPUT or (
+        Path(text).suffix in FIGURE_SUFFIXES and not Path(text).is_dir()
+    ):
+        return text
+    raise ArgumentTypeError(
+        f'{text!r} is no file name that ends in {", ".join(FIGURE_SUFFIXES)}, nor - (a PNG)'
+    )
+
+
+def explain_os(error: OSError) -> str:
+    """Return what the operating system complains about, without its number."""
+    reason = error.strerror or str(error)
+    return f'{error.filename}: {reason}' if error.filename else reason
 
 
 def split_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -46,7 +166,7 @@ def explain_missing(error: ImportError, extra: str) -> int:
     return 1
 
 
-def missing_for_plot(path: Path | None) -> str:
+def missing_for_plot(path: str | None) -> str:
     """Return what a figure needs that is not installed, empty if nothing or no figure."""
     if path is None or find_spec('matplotlib') is not None:
         return ''

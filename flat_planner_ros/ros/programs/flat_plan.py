@@ -20,9 +20,9 @@ import csv
 from dataclasses import replace
 from itertools import chain
 import json
-from pathlib import Path
 import sys
 from time import perf_counter
+from typing import TextIO
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import RequestRejected
@@ -37,14 +37,24 @@ from flat_planner_ros.core.session import (
 )
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import build, ROWS
-from flat_planner_ros.ros.programs.command_line import explain_missing
+from flat_planner_ros.ros.programs.command_line import (
+    by_joint,
+    explain_os,
+    figure_name,
+    joint_angle,
+    JointAngles,
+    missing_for_plot,
+    parsed,
+    pose_of,
+)
+from flat_planner_ros.ros.programs.outputs import open_text, summary_stream, write_through
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 
 EXAMPLES = """
 examples:
   flat_plan joint1=3.14159 --duration 1
       the paper's arm, least effort
-  flat_plan joint1=1.5 --duration 0.8 --params-file my_arm.yaml --png plan.png
+  flat_plan joint1=1.5 --duration 0.8 --params-file my_arm.yaml --plot plan.png
       your own arm, with a figure
   flat_plan joint1=3.14159 --duration 1 -p strategy:=mixed -p weights.p:=20.0 --csv plan.csv
       another strategy, as points every sampling.period
@@ -76,7 +86,10 @@ def main(args: Sequence[str] | None = None) -> int:
         0 if there is a plan, 1 if the goal or the parameters are refused, 2 for a wrong call.
 
     """
-    options = _parser().parse_args(args)
+    options = parsed(_parser(), args, ['csv', 'json', 'plot'])
+    if missing := missing_for_plot(options.plot):
+        print(f'flat_plan: {missing}', file=sys.stderr)
+        return 1
     try:
         settings = read_settings(
             options.params_file,
@@ -94,18 +107,18 @@ def main(args: Sequence[str] | None = None) -> int:
         joints = settings.session.joints
         status = diagnostics.accepted_status(motion, goal, joints, elapsed)
         values = {pair.key: pair.value for pair in status.values}
-        if options.json != '-':
-            _print_summary(motion, values)
+        _print_summary(motion, values, summary_stream(options.csv, options.json, options.plot))
         _write(options, joints, track, values)
     except RequestRejected as error:
         code = interfaces.ERROR_CODES[error.reason]
         print(f'flat_plan: {error.reason.value} ({code}): {error}', file=sys.stderr)
         return 1
-    except (FlatPlannerError, OSError) as error:
+    except FlatPlannerError as error:
         print(f'flat_plan: {error}', file=sys.stderr)
         return 1
-    except ImportError as error:
-        return explain_missing(error, 'plot')
+    except OSError as error:
+        print(f'flat_plan: {explain_os(error)}', file=sys.stderr)
+        return 1
     return 0
 
 
@@ -118,7 +131,12 @@ def _parser() -> ArgumentParser:
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        'goal', nargs='+', type=_angle, metavar='JOINT=RAD', help='final angle of a joint [rad]'
+        'goal',
+        nargs='+',
+        action=JointAngles,
+        type=joint_angle,
+        metavar='JOINT=RAD',
+        help='final angle of a joint [rad]',
     )
     parser.add_argument(
         '--duration',
@@ -130,9 +148,9 @@ def _parser() -> ArgumentParser:
     parser.add_argument(
         '--start',
         nargs='+',
-        action='extend',
-        default=[],
-        type=_angle,
+        action=JointAngles,
+        default={},
+        type=joint_angle,
         metavar='JOINT=RAD',
         help='where joints start, at rest (default: 0)',
     )
@@ -156,41 +174,31 @@ def _parser() -> ArgumentParser:
     parser.add_argument(
         '--namespace', default='', help="of the planner, for files with a namespace's blocks"
     )
-    output = parser.add_argument_group('output, besides the summary')
+    output = parser.add_argument_group('output, besides the summary; - is standard output')
     output.add_argument('--csv', metavar='FILE', help='points every sampling.period')
-    output.add_argument('--json', metavar='FILE', help='summary and points; - prints them instead')
-    output.add_argument('--png', metavar='FILE', help='figure of the motion (needs matplotlib)')
+    output.add_argument('--json', metavar='FILE', help='summary and points')
+    output.add_argument(
+        '--plot',
+        metavar='FILE',
+        type=figure_name,
+        help='figure of the motion, .png, .pdf or .svg (needs matplotlib)',
+    )
     return parser
-
-
-def _angle(text: str) -> tuple[str, float]:
-    """Return a joint and its angle [rad]."""
-    name, separator, value = text.partition('=')
-    try:
-        if name and separator:
-            return name, float(value)
-    except ValueError:
-        pass
-    raise ArgumentTypeError(f'{text!r} is not JOINT=RAD, e.g. joint1=1.57')
 
 
 def _via(text: str) -> tuple[dict[str, float], float]:
     """Return a pose and its time, 0 where it is left open [s]."""
     pose, separator, time = text.partition('@')
     try:
-        return dict(map(_angle, pose.split(','))), float(time) if separator else 0.0
+        return by_joint(map(joint_angle, pose.split(','))), float(time) if separator else 0.0
     except ValueError:
         raise ArgumentTypeError(f'{time!r} in {text!r} is no time in seconds') from None
 
 
 def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession, Goal]:
     """Return a planner at rest at the start, and the goal."""
-    start = {**dict.fromkeys(settings.joints, 0.0), **dict(options.start)}
-    for name in start:
-        if name not in settings.joints:
-            raise FlatPlannerError(
-                f'--start: unknown joint {name!r}; the arm has {", ".join(settings.joints)}'
-            )
+    angles = pose_of(options.start, settings.joints, '--start')
+    start = dict(zip(settings.joints, angles, strict=True))
     session = PlannerSession(
         replace(
             settings,
@@ -201,7 +209,7 @@ def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession
     )
     poses = [start]
     for changes in [*(pose for pose, _ in options.via), options.goal]:
-        poses.append({**poses[-1], **dict(changes)})
+        poses.append({**poses[-1], **changes})
     names = tuple(poses[-1])
     times = [*(time for _, time in options.via), options.duration]
     points = [
@@ -211,11 +219,11 @@ def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession
     return session, Goal(joint_names=names, points=tuple(points))
 
 
-def _print_summary(motion: Motion, values: Mapping[str, str]) -> None:
+def _print_summary(motion: Motion, values: Mapping[str, str], file: TextIO) -> None:
     """Print what the verdict on a goal says, less what only matters in motion."""
     left_out = {'plan_id', 'state', 'error_code', 'error_name', 'start_time'}
     plan = motion.plan
-    print(f'{plan.options.strategy.value}, {plan.duration:g} s')
+    print(f'{plan.options.strategy.value}, {plan.duration:g} s', file=file)
     shown = {
         key: value
         for key, value in values.items()
@@ -223,7 +231,7 @@ def _print_summary(motion: Motion, values: Mapping[str, str]) -> None:
     }
     width = max(map(len, shown))
     for key, value in shown.items():
-        print(f'  {key:{width}}  {value}')
+        print(f'  {key:{width}}  {value}', file=file)
 
 
 def _write(
@@ -231,7 +239,7 @@ def _write(
 ) -> None:
     """Write the files that are asked for."""
     if options.csv:
-        with open(options.csv, 'w', newline='', encoding='utf-8') as file:
+        with open_text(options.csv) as file:
             writer = csv.writer(file)
             titles = [title.format(name) for title in QUANTITIES.values() for name in joints]
             writer.writerow(['time [s]', *titles])
@@ -245,14 +253,13 @@ def _write(
             'times': track.times.tolist(),
             **{quantity: getattr(track, quantity).tolist() for quantity in QUANTITIES},
         }
-        if options.json == '-':
-            print(json.dumps(content))
-        else:
-            Path(options.json).write_text(json.dumps(content), encoding='utf-8')
-    if options.png:
+        with open_text(options.json) as file:
+            print(json.dumps(content), file=file)
+    if options.plot:
+        # Imported here: matplotlib is an extra.
         from flat_planner_ros.figures.plan_figure import draw_plan
 
-        draw_plan(track, joints, Path(options.png))
+        write_through(options.plot, lambda path: draw_plan(track, joints, path), '.png')
 
 
 def _number(text: str) -> float | str:

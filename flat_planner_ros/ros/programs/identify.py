@@ -24,7 +24,14 @@ from flat_planner_ros.core.model_fit import fit_model, Trust
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters.fitted_file import write_fitted
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
-from flat_planner_ros.ros.programs.command_line import explain_missing, missing_for_plot
+from flat_planner_ros.ros.programs.command_line import (
+    explain_missing,
+    explain_os,
+    figure_name,
+    missing_for_plot,
+    parsed,
+)
+from flat_planner_ros.ros.programs.outputs import summary_stream, write_through
 from flat_planner_ros.ros.wire import interfaces
 
 
@@ -38,7 +45,7 @@ def main(args: Sequence[str] | None = None) -> int:
         0 with a model that explains the motions, 1 without.
 
     """
-    options = _parser().parse_args((sys.argv if args is None else args)[1:])
+    options = parsed(_parser(), (sys.argv if args is None else args)[1:], ['output', 'plot'])
     missing = missing_for_plot(options.plot)
     if missing:
         print(missing, file=sys.stderr)
@@ -59,16 +66,23 @@ def main(args: Sequence[str] | None = None) -> int:
             topic=options.joint_states,
         )
         fit = fit_model(found, settings.arm, trust=Trust(options.trust))
-        print(fit.text)
+        print(fit.text, file=summary_stream(options.output, options.plot))
         if options.plot is not None:
             # Imported here: matplotlib is an extra.
             from flat_planner_ros.figures.fit_figure import draw_fit
 
-            draw_fit(found, fit, options.plot)
+            write_through(options.plot, lambda path: draw_fit(found, fit, path), '.png')
         if options.output is not None:
-            write_fitted(options.params_file, fit, settings.arm, options.output)
-    except (FlatPlannerError, OSError) as error:
+            write_through(
+                options.output,
+                lambda path: write_fitted(options.params_file, fit, settings.arm, path),
+                '.yaml',
+            )
+    except FlatPlannerError as error:
         print(f'identify: {error}', file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f'identify: {explain_os(error)}', file=sys.stderr)
         return 1
     return 1 if fit.misfit else 0
 
@@ -88,8 +102,13 @@ def _parser() -> ArgumentParser:
         required=True,
         help='parameter file with the model as believed so far',
     )
-    add('-o', '--output', metavar='FILE', type=Path, help='parameter file to write')
-    add('--plot', metavar='FILE.png', type=Path, help='draw measured and simulated motion')
+    add('-o', '--output', metavar='FILE', help='parameter file to write, or -')
+    add(
+        '--plot',
+        metavar='FILE',
+        type=figure_name,
+        help='measured and simulated motion, .png, .pdf or .svg, or -',
+    )
     add(
         '--trust',
         choices=[trust.value for trust in Trust],

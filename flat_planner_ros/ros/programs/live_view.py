@@ -23,7 +23,7 @@ import sys
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.ros.live_view.live_node import LiveNode
 from flat_planner_ros.ros.nodes.node_runner import run
-from flat_planner_ros.ros.programs.command_line import explain_missing, split_arguments
+from flat_planner_ros.ros.programs.command_line import explain_missing, parsed, split_arguments
 
 HOST, PORT = '127.0.0.1', 8765
 """Address of the page by default: for browsers of this machine only."""
@@ -36,7 +36,7 @@ class NoAddress(FlatPlannerError):
 def main(args: Sequence[str] | None = None) -> int:
     """Serve the page until interrupted; return the exit code."""
     own, ros = split_arguments(sys.argv if args is None else args)
-    options = _parser().parse_args(own)
+    options = parsed(_parser(), own)
     try:
         from flat_planner_ros.ros.live_view.server import application, ServerThread
     except ImportError as error:

@@ -16,16 +16,17 @@
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
-from pathlib import Path
 import sys
 
 from flat_planner_ros.core.arm import ControlBlock, FlatPlannerError, PLUGINS
+from flat_planner_ros.ros.programs.command_line import explain_os, parsed
+from flat_planner_ros.ros.programs.outputs import open_text, STANDARD_OUTPUT
 from flat_planner_ros.ros.programs.robot_description import read_drive, read_urdf
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Write the URDF; 0 if it could be made, 1 if the parameters are no arm."""
-    options = _parser().parse_args(args)
+    options = parsed(_parser(), args)
     try:
         urdf = read_urdf(
             options.params_file,
@@ -33,12 +34,13 @@ def main(args: Sequence[str] | None = None) -> int:
             drawn_length=options.drawn_length,
             control=_control(options),
         )
-        if options.output:
-            Path(options.output).write_text(urdf, 'utf-8')
-        else:
-            sys.stdout.write(urdf)
-    except (FlatPlannerError, OSError) as error:
+        with open_text(options.output) as file:
+            file.write(urdf)
+    except FlatPlannerError as error:
         print(f'make_urdf: {error}', file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f'make_urdf: {explain_os(error)}', file=sys.stderr)
         return 1
     return 0
 
@@ -49,14 +51,20 @@ def _parser() -> ArgumentParser:
         prog='make_urdf',
         description='Print the URDF of the arm in a parameter file: its links with their '
         'inertias, and on demand its ros2_control block.',
-        epilog='example: make_urdf arm.yaml --ros2-control mock --output arm.urdf',
+        epilog='example: make_urdf --params-file arm.yaml --ros2-control mock --output arm.urdf',
     )
     parser.add_argument(
-        'params_file',
-        nargs='?',
+        '--params-file',
+        metavar='FILE',
         help="ROS parameter file with the arm's model; without it, the paper's arm",
     )
-    parser.add_argument('-o', '--output', metavar='FILE', help='write to a file instead')
+    parser.add_argument(
+        '-o',
+        '--output',
+        metavar='FILE',
+        default=STANDARD_OUTPUT,
+        help='file to write; -, the default, is standard output',
+    )
     parser.add_argument(
         '--namespace', default='', help="of the planner, for files with a namespace's blocks"
     )

@@ -16,7 +16,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 import csv
 from functools import partial
 from pathlib import Path
@@ -29,7 +29,18 @@ from flat_planner_ros.child_process import end_with_parent
 from flat_planner_ros.figures.paper_example import BEYOND, CASES, Method, Result, Scenario
 from flat_planner_ros.programs import INTERRUPTED
 from flat_planner_ros.ros.nodes.node_runner import signals_caught
-from flat_planner_ros.ros.programs.command_line import missing_for_plot
+from flat_planner_ros.ros.programs.command_line import (
+    explain_os,
+    figure_name,
+    missing_for_plot,
+    parsed,
+)
+from flat_planner_ros.ros.programs.outputs import (
+    NotWritten,
+    open_text,
+    summary_stream,
+    write_through,
+)
 from flat_planner_ros.ros.programs.paper_experiment import (
     Experimenter,
     ExperimentFailed,
@@ -99,29 +110,33 @@ def main(args: Sequence[str] | None = None) -> int:
 
     """
     options = _options(remove_ros_args(args if args is not None else sys.argv)[1:])
+    summary = summary_stream(options.csv, options.plot)
     if missing := missing_for_plot(options.plot):
         print(missing, file=sys.stderr)
         return 1
     for path in (options.plot, options.csv):
-        if path is not None and not path.parent.is_dir():
-            print(f'paper_table: no directory {path.parent} for {path.name}', file=sys.stderr)
+        if path is not None and not Path(path).parent.is_dir():
+            print(f'paper_table: no directory {Path(path).parent} for {path}', file=sys.stderr)
             return 1
     speed = 1.0 if options.real_time else SPEED
     try:
-        with signals_caught() as interrupted:
+        with signals_caught() as interrupted, redirect_stdout(summary):
             arguments = None if args is None else list(args)
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             refuse_company(interrupted)
             results = _results(speed, BEYOND if options.beyond else CASES, interrupted)
-        print(REMARKS, flush=True)
+        print(REMARKS, file=summary, flush=True)
         if options.beyond:
-            print(BEYOND_REMARKS, flush=True)
+            print(BEYOND_REMARKS, file=summary, flush=True)
         if options.csv is not None:
             _write_csv(results, options.csv)
         if options.plot is not None:
             _draw(results, options.plot)
-    except (ExperimentFailed, OSError) as error:
+    except (ExperimentFailed, NotWritten) as error:
         print(f'paper_table: {error}', file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f'paper_table: {explain_os(error)}', file=sys.stderr)
         return 1
     except Interrupted:
         print('interrupted', file=sys.stderr)
@@ -140,14 +155,16 @@ def _options(arguments: Sequence[str]) -> Namespace:
         help='add a plant that is 10 %% softer, and what the paper does not have: exact and '
         'insensitive motions, and a second motion after self-tuning',
     )
-    parser.add_argument('--plot', metavar='FILE.png', type=Path, help='draw the figures')
-    parser.add_argument('--csv', metavar='FILE', type=Path, help='write the numbers')
+    parser.add_argument(
+        '--plot', metavar='FILE', type=figure_name, help='figures, .png, .pdf or .svg, or -'
+    )
+    parser.add_argument('--csv', metavar='FILE', help='the numbers, or -')
     parser.add_argument(
         '--real-time',
         action='store_true',
         help=f'run the plant in real time instead of {SPEED:g} times faster',
     )
-    return parser.parse_args(arguments)
+    return parsed(parser, arguments, ['csv', 'plot'])
 
 
 def _results(
@@ -228,9 +245,9 @@ def _row(result: Result) -> str:
     )
 
 
-def _write_csv(results: Sequence[Result], path: Path) -> None:
+def _write_csv(results: Sequence[Result], name: str) -> None:
     """Write the numbers."""
-    with path.open('w', newline='', encoding='utf-8') as file:
+    with open_text(name) as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for result in results:
@@ -238,16 +255,16 @@ def _write_csv(results: Sequence[Result], path: Path) -> None:
             numbers = map(repr, (result.rms_effort, result.amplitude, *printed))
             row = [result.scenario.number, result.strategy, *numbers]
             writer.writerow([*row, *[''] * (len(COLUMNS) - len(row))])
-    print(f'numbers: {path}')
+    print(f'numbers: {name}', file=sys.stderr)
 
 
-def _draw(results: Sequence[Result], path: Path) -> None:
+def _draw(results: Sequence[Result], name: str) -> None:
     """Draw the figures."""
     # Imported here: matplotlib is an extra.
     from flat_planner_ros.figures.paper_figures import draw
 
-    draw(results, path)
-    print(f'figures: {path}')
+    write_through(name, lambda path: draw(results, path), '.png')
+    print(f'figures: {name}', file=sys.stderr)
 
 
 if __name__ == '__main__':

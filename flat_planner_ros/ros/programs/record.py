@@ -21,13 +21,13 @@ from pathlib import Path
 import sys
 
 from flat_planner_ros.ros.nodes.node_runner import run
-from flat_planner_ros.ros.programs.command_line import explain_missing, split_arguments
+from flat_planner_ros.ros.programs.command_line import explain_missing, parsed, split_arguments
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Record until interrupted; return the exit code."""
     own, ros = split_arguments(sys.argv if args is None else args)
-    options = _parser().parse_args(own)
+    options = parsed(_parser(), own)
     try:
         from flat_planner_ros.ros.recording.recorder_node import RecorderNode
     except ImportError as error:

@@ -21,6 +21,7 @@ one motion and for longer ones. No node has to run.
 
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 import csv
 from dataclasses import astuple, fields
 from pathlib import Path
@@ -35,18 +36,26 @@ from flat_planner_ros.core.planning import (
 )
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
-from flat_planner_ros.ros.programs.command_line import missing_for_plot
+from flat_planner_ros.ros.programs.command_line import (
+    explain_os,
+    figure_name,
+    joint_angle,
+    JointAngles,
+    missing_for_plot,
+    parsed,
+    pose_of,
+)
+from flat_planner_ros.ros.programs.outputs import open_text, summary_stream, write_through
 from flat_planner_ros.ros.wire import interfaces
-import numpy as np
 
 STRETCHES = (1.0, 1.1, 1.25, 1.5)
 """Durations of the sweeps unless others are asked for, over that of the motion [-]."""
 
 EXAMPLES = """\
 examples:
-  tradeoff --final 3.14 0 --duration 1 --plot tradeoff.png
-  tradeoff --params-file arm.yaml --final 1.5 0 --duration 0.8 --csv tradeoff.csv
-  tradeoff --final 3.14 0 --duration 1 --stretch 1 1.05 -p insensitivity.stiffness:=0.2
+  tradeoff joint1=3.14 --duration 1 --plot tradeoff.png
+  tradeoff joint1=1.5 --params-file arm.yaml --duration 0.8 --csv tradeoff.csv
+  tradeoff joint1=3.14 --duration 1 --stretch 1 1.05 -p insensitivity.stiffness:=0.2
 """
 
 
@@ -63,17 +72,21 @@ def main(args: Sequence[str] | None = None) -> int:
     options = _options(args)
     try:
         points, box = _points(options)
-        _print(points, box)
+        with redirect_stdout(summary_stream(options.csv, options.plot)):
+            _print(points, box)
         if options.csv is not None:
             _write_csv(points, options.csv)
         if options.plot is not None:
             # Imported here: matplotlib is an extra.
             from flat_planner_ros.figures.tradeoff_figure import draw
 
-            draw(points, box, options.plot)
-            print(f'figure: {options.plot}')
-    except (FlatPlannerError, OSError) as error:
+            write_through(options.plot, lambda path: draw(points, box, path), '.png')
+            print(f'figure: {options.plot}', file=sys.stderr)
+    except FlatPlannerError as error:
         print(f'tradeoff: {error}', file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f'tradeoff: {explain_os(error)}', file=sys.stderr)
         return 1
     return 0
 
@@ -98,19 +111,26 @@ def _options(args: Sequence[str] | None) -> Namespace:
         help='another value of a parameter of the planner node; may be repeated',
     )
     parser.add_argument(
-        '--final',
-        metavar='ANGLE',
-        type=float,
+        'goal',
         nargs='+',
-        required=True,
-        help='final angle of every joint [rad], the passive one 0; may be left out at the end',
+        action=JointAngles,
+        type=joint_angle,
+        metavar='JOINT=RAD',
+        help='final angle of a joint [rad]',
     )
     parser.add_argument(
-        '--start', metavar='ANGLE', type=float, nargs='+', help='the same of the start; else zeros'
+        '--start',
+        nargs='+',
+        action=JointAngles,
+        default={},
+        type=joint_angle,
+        metavar='JOINT=RAD',
+        help='where joints start, at rest (default: 0); others stay there',
     )
     parser.add_argument(
-        '--duration', metavar='SECONDS', type=float, required=True, help='of the motion'
+        '--namespace', default='', help="of the planner, for files with a namespace's blocks"
     )
+    parser.add_argument('--duration', metavar='S', type=float, required=True, help='of the motion')
     parser.add_argument(
         '--stretch',
         metavar='RATIO',
@@ -119,9 +139,11 @@ def _options(args: Sequence[str] | None) -> Namespace:
         default=STRETCHES,
         help='durations of the sweeps over that of the motion (default: 1 1.1 1.25 1.5)',
     )
-    parser.add_argument('--plot', metavar='FILE.png', type=Path, help='draw the picture')
-    parser.add_argument('--csv', metavar='FILE', type=Path, help='write the numbers')
-    options = parser.parse_args(args)
+    parser.add_argument(
+        '--plot', metavar='FILE', type=figure_name, help='picture, .png, .pdf or .svg, or -'
+    )
+    parser.add_argument('--csv', metavar='FILE', help='the numbers, or -')
+    options = parsed(parser, args, ['csv', 'plot'])
     if missing := missing_for_plot(options.plot):
         parser.error(missing)
     return options
@@ -133,14 +155,14 @@ def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
         options.params_file,
         planner_parameters.ROWS,
         planner_parameters.build,
-        node=interfaces.PLANNER,
+        node=f'{options.namespace}/{interfaces.PLANNER}',
         overrides=options.parameter,
         warn=lambda text: print(f'tradeoff: {text}', file=sys.stderr),
     ).session
     arm, planning = settings.arm, settings.options
     request = MotionRequest(
-        start=_pose(options.start or [], arm.n),
-        final=_pose(options.final, arm.n),
+        start=pose_of(options.start, settings.joints, '--start'),
+        final=pose_of({**options.start, **options.goal}, settings.joints, 'goal'),
         duration=options.duration,
     )
     wanted = PlanningOptions(
@@ -152,13 +174,6 @@ def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
     )
     text = str(planning.insensitivity.box).replace('+-', '±')
     return tradeoff_points(request, arm, wanted, stretches=options.stretch), text
-
-
-def _pose(angles: Sequence[float], joints: int) -> np.ndarray:
-    """Return an angle for every joint."""
-    if len(angles) > joints:
-        raise FlatPlannerError(f'{len(angles)} angles for an arm of {joints} joints')
-    return np.array([*angles, *[0.0] * (joints - len(angles))])
 
 
 def _print(points: Sequence[TradeoffPoint], box: str) -> None:
@@ -193,13 +208,13 @@ def _line(point: TradeoffPoint) -> str:
     )
 
 
-def _write_csv(points: Sequence[TradeoffPoint], path: Path) -> None:
+def _write_csv(points: Sequence[TradeoffPoint], name: str) -> None:
     """Write all numbers."""
-    with path.open('w', newline='', encoding='utf-8') as file:
+    with open_text(name) as file:
         writer = csv.writer(file)
         writer.writerow([field.name for field in fields(TradeoffPoint)])
         writer.writerows(astuple(point) for point in points)
-    print(f'numbers: {path}')
+    print(f'numbers: {name}', file=sys.stderr)
 
 
 if __name__ == '__main__':

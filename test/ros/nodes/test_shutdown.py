@@ -165,7 +165,7 @@ def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_tool_that_is_interrupted_ends_with_130_and_no_word(graph, number):
     many = ['--stretch', *map(str, np.linspace(1.0, 3.0, 500))]
-    process = start(graph, 'tradeoff', '--final', '3.14', '--duration', '1', *many)
+    process = start(graph, 'tradeoff', 'joint1=3.14', '--duration', '1', *many)
     graph.expect(lambda: has_loaded(process, 'scipy'), 'a program at work')
     assert process.stop(number) == 130
     assert process.stderr == ''

@@ -58,7 +58,7 @@ def test_points_are_written_as_csv_and_json(tmp_path, capsys):
 def test_a_figure_is_drawn(tmp_path):
     pytest.importorskip('matplotlib')
     path = tmp_path / 'plan.png'
-    assert flat_plan.main(['joint1=1.0', '--duration', '0.5', '--png', str(path)]) == 0
+    assert flat_plan.main(['joint1=1.0', '--duration', '0.5', '--plot', str(path)]) == 0
     assert path.read_bytes().startswith(b'\x89PNG')
 
 

@@ -49,8 +49,8 @@ def test_every_shipped_arm_has_a_urdf(file):
 
 def test_it_prints_what_it_writes(tmp_path):
     file = tmp_path / 'arm.urdf'
-    printed = make_urdf(CONFIG / 'arm_2dof.yaml').stdout
-    make_urdf(CONFIG / 'arm_2dof.yaml', '--output', file)
+    printed = make_urdf('--params-file', CONFIG / 'arm_2dof.yaml').stdout
+    make_urdf('--params-file', CONFIG / 'arm_2dof.yaml', '--output', file)
     assert file.read_text('utf-8') == printed == read_urdf(CONFIG / 'arm_2dof.yaml')
 
 
@@ -72,7 +72,8 @@ def test_the_command_interface_is_the_drive_s(tmp_path):
     text = (CONFIG / 'arm_2dof.yaml').read_text('utf-8')
     for drive in ('effort', 'position'):
         file.write_text(text.replace('drive: effort', f'drive: {drive}'), 'utf-8')
-        root = ElementTree.fromstring(make_urdf(file, '--ros2-control', 'mock').stdout.encode())
+        urdf = make_urdf('--params-file', file, '--ros2-control', 'mock').stdout
+        root = ElementTree.fromstring(urdf.encode())
         assert root.find('ros2_control/joint/command_interface').get('name') == drive
 
 
@@ -102,7 +103,7 @@ def test_limits_of_the_planner_become_limits_of_the_joints(tmp_path):
 @pytest.mark.parametrize(
     ('arguments', 'complaint', 'code'),
     [
-        (['nowhere.yaml'], 'cannot read', 1),
+        (['--params-file', 'nowhere.yaml'], 'cannot read', 1),
         (['--drawn-length', '0'], 'drawn_length', 1),
         (['--hardware-param', 'novalue', '--ros2-control', 'mock'], 'NAME=VALUE', 2),
         (['--output', '/nowhere/arm.urdf'], 'No such file', 1),

@@ -21,7 +21,7 @@ from flat_planner_ros.ros.programs import tradeoff
 import pytest
 
 CONFIG = Path(__file__).resolve().parents[3] / 'config' / 'arm_2dof.yaml'
-MOTION = ['--final', '3.14159265', '--duration', '1', '--stretch', '1']
+MOTION = ['joint1=3.14159265', '--duration', '1', '--stretch', '1']
 
 
 def rows(path):
@@ -71,8 +71,8 @@ def test_the_drive_decides(tmp_path):
     [
         (['--params-file', 'none.yaml', *MOTION], 'cannot read none.yaml'),
         ([*MOTION, '-p', 'insensitivity.stifness:=0.2'], 'did you mean insensitivity.stiff'),
-        (['--final', '1', '2', '3', '--duration', '1'], '3 angles for an arm of 2 joints'),
-        (['--final', '1', '--duration', '-1'], 'duration must be positive'),
+        (['elbow=1', '--duration', '1'], "unknown joint 'elbow'; the arm has joint1, joint2"),
+        (['joint1=1', '--duration', '-1'], 'duration must be positive'),
         ([*MOTION, '--csv', '/nowhere/numbers.csv'], 'No such file'),
     ],
 )
@@ -87,4 +87,4 @@ def test_help_has_examples(capsys):
     with pytest.raises(SystemExit) as ended:
         tradeoff.main(['--help'])
     assert ended.value.code == 0
-    assert 'tradeoff --final 3.14 0 --duration 1 --plot tradeoff.png' in capsys.readouterr().out
+    assert 'tradeoff joint1=3.14 --duration 1 --plot tradeoff.png' in capsys.readouterr().out

@@ -170,7 +170,7 @@ def test_three_nodes_are_recorded_and_judged_again(graph, tmp_path, capsys):
         counts = {topic: info.msgcount for topic, info in reader.topics.items()}
     assert counts['/flat_planner/goal'] == counts['/flat_monitor/report'] == 1
 
-    assert analyse.main(['analyse', str(path), '--json']) == 0
+    assert analyse.main(['analyse', str(path), '--json', '-']) == 0
     (report,) = json.loads(capsys.readouterr().out)['reports']
     live = values(reports[0])
     again = report['values']
@@ -205,7 +205,7 @@ def test_a_recording_gives_the_report_of_the_time(graph, tmp_path, capsys):
     graph.expect(lambda: b'stiffness' in path.read_bytes(), 'parameters of the monitor')
     graph.remove(recorder)
 
-    assert analyse.main(['analyse', str(path), '--json']) == 0
+    assert analyse.main(['analyse', str(path), '--json', '-']) == 0
     (report,) = json.loads(capsys.readouterr().out)['reports']
     its = values(reports[0])
     assert set(report['values']) == set(its) >= {'amplitude', 'stiffness_estimate'}
@@ -421,7 +421,9 @@ def test_a_bag_of_another_storage_with_other_names_is_analysed(graph, tmp_path, 
     assert analyse.main(['analyse', str(bag)]) == 1
     assert '/robot/command' in capsys.readouterr().err
     chosen = ['--plan', '/robot/command', '--joint-states', '/robot/measured']
-    assert analyse.main(['analyse', str(bag), *chosen, '--json', '--window', str(WINDOW)]) == 0
+    assert (
+        analyse.main(['analyse', str(bag), *chosen, '--json', '-', '--window', str(WINDOW)]) == 0
+    )
     (report,) = json.loads(capsys.readouterr().out)['reports']
     assert report['values']['start_time'] == float(values(reports[0])['start_time'])
     assert report['values']['samples'] > 0
@@ -442,7 +444,7 @@ def test_recorded_joint_states_in_parts_without_stamps_are_analysed(tmp_path, ca
             arrival = round((START + k * PERIOD) * 1e9)
             writer.write('/joint_states', arrival, serialize_message(part))
     writer.close()
-    assert analyse.main(['analyse', str(path), '--json', '--window', str(WINDOW)]) == 0
+    assert analyse.main(['analyse', str(path), '--json', '-', '--window', str(WINDOW)]) == 0
     document = json.loads(capsys.readouterr().out)
     (report,) = document['reports']
     assert report['values']['amplitude'] == pytest.approx(SWING, rel=1e-3)
