@@ -27,9 +27,10 @@ from pathlib import Path
 import sys
 from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray
 from flat_planner_ros.ros.programs.outputs import STANDARD_OUTPUT
 from flat_planner_ros.version import version_line
+import numpy as np
 
 FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
 """Suffixes of figures, which decide what is drawn."""
@@ -105,7 +106,7 @@ def by_joint(angles: Iterable[tuple[str, float]]) -> dict[str, float]:
     return found
 
 
-def pose_of(angles: Mapping[str, float], joints: Sequence[str], what: str) -> list[float]:
+def pose_of(angles: Mapping[str, float], joints: Sequence[str], what: str) -> FloatArray:
     """
     Return the angles of all joints, 0 where none is given [rad].
 
@@ -120,7 +121,7 @@ def pose_of(angles: Mapping[str, float], joints: Sequence[str], what: str) -> li
             raise FlatPlannerError(
                 f'{what}: unknown joint {name!r}; the arm has {", ".join(joints)}'
             )
-    return [angles.get(name, 0.0) for name in joints]
+    return np.array([angles.get(name, 0.0) for name in joints])
 
 
 def figure_name(text: str) -> str:

@@ -198,7 +198,7 @@ def _via(text: str) -> tuple[dict[str, float], float]:
 def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession, Goal]:
     """Return a planner at rest at the start, and the goal."""
     angles = pose_of(options.start, settings.joints, '--start')
-    start = dict(zip(settings.joints, angles, strict=True))
+    start = dict(zip(settings.joints, angles.tolist(), strict=True))
     session = PlannerSession(
         replace(
             settings,
