@@ -14,11 +14,18 @@
 
 """Planner and monitor for a real arm, whose controller plays the command."""
 
+import os
 from pathlib import Path
 
 from flat_planner_ros.core import Strategy
+from flat_planner_ros.ros.dds_profile import profile_environment, VARIABLES
 from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    SetEnvironmentVariable,
+)
 from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
@@ -91,6 +98,13 @@ def generate_launch_description() -> LaunchDescription:
                 choices=BOOLEAN,
                 description='record all topics into an MCAP file in the present directory',
             ),
+            DeclareLaunchArgument(
+                'dds_profile',
+                default_value='auto',
+                description='profiles of Fast DDS; auto = config/dds/fastdds.xml of this package, '
+                'unless the environment names a file; none = leave Fast DDS as it is',
+            ),
+            OpaqueFunction(function=_profile),
             OpaqueFunction(function=_nodes),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(view),
@@ -98,6 +112,17 @@ def generate_launch_description() -> LaunchDescription:
             ),
         ]
     )
+
+
+def _profile(context: LaunchContext) -> list[SetEnvironmentVariable]:
+    """Return the environment by which nodes started from here on find the profiles."""
+    chosen = LaunchConfiguration('dds_profile').perform(context)
+    if chosen == 'none':
+        return []
+    found = (
+        profile_environment(os.environ) if chosen == 'auto' else dict.fromkeys(VARIABLES, chosen)
+    )
+    return [SetEnvironmentVariable(name, value) for name, value in found.items()]
 
 
 def _nodes(context: LaunchContext) -> list[Node]:

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 import csv
 from functools import partial
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -28,6 +29,7 @@ from threading import Event
 from flat_planner_ros.child_process import end_with_parent
 from flat_planner_ros.figures.paper_example import BEYOND, CASES, Method, Result, Scenario
 from flat_planner_ros.programs import INTERRUPTED
+from flat_planner_ros.ros.dds_profile import profile_environment
 from flat_planner_ros.ros.nodes.node_runner import signals_caught
 from flat_planner_ros.ros.programs.command_line import (
     explain_os,
@@ -122,6 +124,7 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         with signals_caught() as interrupted, redirect_stdout(summary):
             arguments = None if args is None else list(args)
+            os.environ.update(profile_environment(os.environ))  # for the nodes, too
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             refuse_company(interrupted)
             results = _results(speed, BEYOND if options.beyond else CASES, interrupted)

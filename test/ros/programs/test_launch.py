@@ -37,13 +37,17 @@ VIEWERS = {
 DEADLINE = 60.0
 """Time in which all programs must have been started, on a busy machine [s]."""
 
+PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+"""Environment variable that names profiles of Fast DDS."""
+
 STAND_IN = f"""#!{sys.executable}
-import pathlib, signal, sys, yaml
+import os, pathlib, signal, sys, yaml
 files = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == '--params-file']
 contents = [yaml.safe_load(pathlib.Path(file).read_text()) for file in files]
 name = next((a[8:] for a in sys.argv if a.startswith('__node:=')), pathlib.Path(sys.argv[0]).name)
 path = pathlib.Path(RECORDS) / name
-path.with_suffix('.tmp').write_text(yaml.dump([sys.argv[1:], contents]))
+profiles = os.environ.get('{PROFILES}', '')
+path.with_suffix('.tmp').write_text(yaml.dump([sys.argv[1:], contents, profiles]))
 path.with_suffix('.tmp').rename(path)
 signal.sigwait([signal.SIGINT, signal.SIGTERM])
 """
@@ -137,6 +141,18 @@ def remappings(record):
 
 
 NODES = ['flat_planner', 'flat_plant', 'flat_monitor']
+
+
+def test_nodes_are_given_the_profiles_of_the_middleware(launched):
+    records = launched.run('demo.launch.py', 'view:=false', names=NODES)
+    assert {Path(record[2]).name for record in records.values()} == {'fastdds.xml'}
+
+
+@pytest.mark.parametrize(('chosen', 'found'), [('none', ''), ('/my/own.xml', '/my/own.xml')])
+def test_the_profiles_are_a_choice(launched, chosen, found):
+    profile = f'dds_profile:={chosen}'
+    records = launched.run('demo.launch.py', 'view:=false', profile, names=NODES)
+    assert {record[2] for record in records.values()} == {found}
 
 
 def test_the_demo_says_what_it_leaves_out_and_starts_the_rest(launched):

@@ -1,0 +1,58 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The settings of the middleware that planned motions want: `config/dds` (docs/two_computers.md).
+
+Fast DDS reads a file of profiles that an environment variable names, when the first node is made.
+"""
+
+from collections.abc import Mapping
+import os
+from pathlib import Path
+
+VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+"""Environment variables that name the profiles, of Fast DDS 2 and of Fast DDS 3."""
+
+OWN_FILES = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
+"""Files in the present directory that Fast DDS reads by itself."""
+
+PROFILES = Path('config', 'dds', 'fastdds.xml')
+"""Place of the profiles in the package's share directory, and in the sources."""
+
+
+def profiles_file() -> Path | None:
+    """Return the installed profiles, else those beside the sources; None where neither is."""
+    package = Path(__file__).parents[1]
+    prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    shares = [Path(prefix, 'share', package.name) for prefix in prefixes]
+    places = [package.parent, *shares]
+    return next((p / PROFILES for p in places if (p / PROFILES).is_file()), None)
+
+
+def profile_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """
+    Return the variables to add for nodes that the package starts itself.
+
+    Parameters
+    ----------
+    environment
+        The variables so far; where they, or a file in the present directory, already configure
+        Fast DDS, nothing is added.
+
+    """
+    has_own = any(environment.get(name) for name in VARIABLES)
+    has_own = has_own or any(Path(name).is_file() for name in OWN_FILES)
+    file = None if has_own else profiles_file()
+    return {} if file is None else dict.fromkeys(VARIABLES, str(file))
