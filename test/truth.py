@@ -22,7 +22,13 @@ from flat_planner_ros.core.insensitive.insensitivity import Criterion, Nominal
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
 from flat_planner_ros.core.insensitive.residual import residual_amplitude
 from flat_planner_ros.core.motion_law import Strategy
-from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, residual_of_plan
+from flat_planner_ros.core.planning import (
+    MotionRequest,
+    Plan,
+    plan,
+    PlanningOptions,
+    residual_of_plan,
+)
 import numpy as np
 from scipy.linalg import expm
 
@@ -34,6 +40,9 @@ FINE = 8000
 
 ACCURACY = (0.01, 1e-6)
 """How far a prediction may be from the truth: relative, or [rad]."""
+
+FIRST_LINK = {'link_length': [0.2], 'link_com': [0.1], 'link_mass': [0.3], 'link_inertia': [1e-3]}
+"""What carries the last two links of an arm of three joints; they do not feel its motion."""
 
 STRATEGIES = (
     Strategy.POLYNOMIAL,
@@ -66,7 +75,7 @@ class Truth(NamedTuple):
 def truth(seed: int) -> Truth:
     """Return the residuals of a random case."""
     rng = np.random.default_rng([seed, 16])
-    arm, period = random_arm(rng)
+    arm, period = random_arm(rng, joints=int(rng.integers(2, 4)))
     drive = Drive(rng.choice([member.value for member in Drive]))
     box = random_box(rng)
     strategy = STRATEGIES[rng.integers(len(STRATEGIES))]
@@ -85,12 +94,15 @@ def truth(seed: int) -> Truth:
         drive=drive,
     )
     duration = period * 10.0 ** rng.uniform(-0.1, 1.0)
-    request = MotionRequest(
-        start=np.zeros(2), final=np.array([rng.uniform(0.3, 3.0), 0.0]), duration=duration
-    )
+    request = MotionRequest(start=np.zeros(arm.n), final=random_pose(rng, arm), duration=duration)
     planned = plan(request, arm, options)
+    state = np.zeros(4)
+    if rng.integers(2):
+        # The same kind of motion to another pose, taken over on the way.
+        planned, state = redirected(rng, planned, random_pose(rng, arm))
     factors = np.array([rng.uniform(low, high) for low, high in box.ranges])
     samples = planned.sample(min(PERIOD, duration / 100.0))
+    begin = float(state[1] - state[0]), float(state[3] - state[2])
     oscillator = Oscillator.of(arm, drive)
     if drive is Drive.EFFORT:
         signal = played = samples.driving_effort
@@ -99,14 +111,36 @@ def truth(seed: int) -> Truth:
         played = planned.sample(duration / FINE).driving_velocity
     poles = oscillator.poles(factors[None])
     return Truth(
-        simulated=simulated(arm, drive, played, duration, factors),
-        predicted=float(residual_amplitude(oscillator, signal, duration, poles)[0]),
+        simulated=simulated(arm, drive, played, duration, factors, state),
+        predicted=float(residual_amplitude(oscillator, signal, duration, poles, begin)[0]),
         worst=residual_of_plan(planned, samples).worst,
-        case=f'{seed}: {strategy.value}, {drive.value}, {duration / period:.3g} periods, {box}',
+        case=f'{seed}: {strategy.value}, {drive.value}, {duration / period:.3g} periods, {box}, '
+        f'{arm.n} joints, from {state}',
     )
 
 
-def random_arm(rng: np.random.Generator) -> tuple[PlanarArm, float]:
+def random_pose(rng: np.random.Generator, arm: PlanarArm) -> np.ndarray:
+    """Return a pose at rest some way from zero."""
+    return np.array([*rng.uniform(-1.0, 1.0, arm.n - 2), rng.uniform(0.3, 3.0), 0.0])
+
+
+def redirected(
+    rng: np.random.Generator, running: Plan, final: np.ndarray
+) -> tuple[Plan, np.ndarray]:
+    """Return a plan that takes over, and the angles and rates of the last two links there."""
+    time = running.duration * rng.uniform(0.1, 0.9)
+    here = running.at(np.array([time]))
+    request = MotionRequest(
+        start=here.positions[0],
+        final=final,
+        duration=running.duration,
+        start_jets=here.planned[:, :6, 0],
+    )
+    links = np.cumsum([here.positions[0], here.velocities[0]], axis=1)[:, -2:]
+    return plan(request, running.problem.arm, running.options), links.ravel()
+
+
+def random_arm(rng: np.random.Generator, *, joints: int = 2) -> tuple[PlanarArm, float]:
     """Return an arm, and the period of its passive joint under an effort [s]."""
     both = 10.0 ** rng.uniform(-4.0, 0.0)
     last = both * rng.uniform(0.02, 0.7)
@@ -117,6 +151,7 @@ def random_arm(rng: np.random.Generator) -> tuple[PlanarArm, float]:
         inertia_star=(both, last),
         stiffness=series * frequency**2,
         damping=2.0 * ratio * series * frequency,
+        **(FIRST_LINK if joints > 2 else {}),
     )
     return arm, 2.0 * np.pi / frequency
 
@@ -133,12 +168,17 @@ def random_box(rng: np.random.Generator) -> UncertaintyBox:
 
 
 def simulated(
-    arm: PlanarArm, drive: Drive, signal: np.ndarray, duration: float, factors: np.ndarray
+    arm: PlanarArm,
+    drive: Drive,
+    signal: np.ndarray,
+    duration: float,
+    factors: np.ndarray,
+    state: np.ndarray,
 ) -> float:
     """
     Return the amplitude that the passive joint keeps, by exact steps of the arm's linear rows.
 
-    The states are the absolute angles of the last two links and their rates; the signal is linear
+    The state is the absolute angles of the last two links and their rates; the signal is linear
     between its samples. The amplitude is that of the mode that the rows themselves have.
     """
     k, c = factors[0] * arm.stiffness, factors[1] * arm.damping
@@ -160,7 +200,6 @@ def simulated(
     whole[:4, 4] = push
     whole[4, 5] = 1.0
     jump = expm(step * whole)
-    state = np.zeros(4)
     for value, slope in zip(signal, slopes, strict=False):
         state = jump[:4, :4] @ state + jump[:4, 4] * value + jump[:4, 5] * slope
     # What is left swings as the passive joint does, link n-1 free or held.

@@ -24,7 +24,12 @@ from flat_planner_ros.core.insensitive.insensitivity import (
     Nominal,
     UncertaintyBox,
 )
-from flat_planner_ros.core.insensitive.law import check_insensitivity, insensitive_motion
+from flat_planner_ros.core.insensitive.law import (
+    check_insensitivity,
+    insensitive_motion,
+    insensitive_motion_from,
+    InsensitiveMotion,
+)
 from flat_planner_ros.core.insensitive.residual import (
     predict_residual,
     PredictedResidual,
@@ -37,6 +42,8 @@ __all__ = [
     'Criterion',
     'DEFAULT_WEIGHT',
     'insensitive_motion',
+    'insensitive_motion_from',
+    'InsensitiveMotion',
     'Insensitivity',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',

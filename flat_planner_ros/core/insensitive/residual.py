@@ -30,6 +30,14 @@ import numpy as np
 BLOCK = 32
 """Effort samples per row of the table of exponentials."""
 
+GREGORY = (3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0)
+"""
+First weights of a trapezoidal sum over what does not begin smoothly.
+
+Gregory's rule, good to the third power of the spacing (Hildebrand, Introduction to numerical
+analysis, 5.9).
+"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PredictedResidual:
@@ -106,28 +114,33 @@ def residual_amplitude(
     fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
     coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
     total = np.einsum('rp,rp->p', padded.reshape(rows, BLOCK) @ fine, coarse)
-    inner, first, jump = _weights(oscillator, poles, step)
+    inner, first = _weights(oscillator, poles, step)
     driven = -inner * total
     angle, velocity = start
     if angle or velocity or signal[0]:
-        # In motion: the first sample weighs less, and the joint brings its own oscillation.
+        # In motion: the first samples weigh less, and the joint brings its own oscillation.
         free = velocity - poles.conj() * angle
-        driven += np.exp(duration * poles) * (free + (inner - first + jump) * signal[0])
+        driven += np.exp(duration * poles) * free
+        for index, weight in enumerate(first):
+            left = np.exp((duration - index * step) * poles)
+            driven += (inner - weight) * signal[index] * left
     amplitudes: FloatArray = np.abs(driven) / poles.imag
     return amplitudes
 
 
 def _weights(
     oscillator: Oscillator, poles: ComplexArray, step: float
-) -> tuple[ComplexArray, ComplexArray, float]:
-    """Return weights of a sample between others, of the first one, and of a velocity there."""
+) -> tuple[ComplexArray, list[ComplexArray]]:
+    """Return weights of a sample between others, and of the first ones of a start in motion."""
     turn = step * poles
     if oscillator.drive is Drive.POSITION:
         # By parts: the velocity is smoother than the acceleration, whose rise may be abrupt.
-        return turn, 0.5 * turn, 1.0
+        first = [weight * turn for weight in GREGORY]
+        first[0] = first[0] - 1.0
+        return turn, first
     hat, half_hat = (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2, (np.expm1(-turn) + turn) / turn**2
     scale = step * oscillator.gain
-    return scale * hat, scale * half_hat, 0.0
+    return scale * hat, [scale * half_hat]
 
 
 def servo_effort(arm: PlanarArm, velocity: FloatArray, duration: float) -> FloatArray:
@@ -187,6 +200,30 @@ def legendre_residuals(
     gain = oscillator.gain_of_sigma / (half * poles.imag)
     rows: ComplexArray = gain[:, None] * integrals
     return rows
+
+
+def swing_of_start(
+    oscillator: Oscillator, factors: FloatArray, duration: float, start: FloatArray
+) -> ComplexArray:
+    """
+    Return what is left of the start's own swing at the end of a motion, shape (p,) [rad].
+
+    Parameters
+    ----------
+    oscillator, factors, duration
+        As for `legendre_residuals`; every arm starts with the same angle and velocity.
+    start
+        Derivatives of the planned variable at the start by x from -1 to 1, shape (6,) [rad].
+
+    """
+    half = 0.5 * duration
+    poles = oscillator.poles(factors)
+    # I*_n / k is the same for both drives.
+    compliance = oscillator.gain_of_sigma / (oscillator.frequency * half) ** 2
+    angle, velocity = -compliance * start[2], -compliance * start[3] / half
+    swing: ComplexArray = np.exp(duration * poles) * (velocity - poles.conj() * angle)
+    swing /= poles.imag
+    return swing
 
 
 def predict_residual(

@@ -150,8 +150,8 @@ class Plan:
     request
         What was asked for.
     options
-        How it was planned: as asked for, but with the strategy polynomial in place of insensitive
-        where the start is in motion.
+        How it was planned: as asked for, but with a quadratic cost in place of another strategy
+        where that cannot be.
     problem
         What plans of the same arm, cost and duration share.
     trajectory

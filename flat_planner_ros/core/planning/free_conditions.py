@@ -41,7 +41,7 @@ from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import path_of, plan
 from flat_planner_ros.core.planning.reference_trajectory import problem_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions, ViaPoint
-from flat_planner_ros.core.planning.strategies import OWN_LAWS
+from flat_planner_ros.core.planning.strategies import OWN_LAWS, with_quadratic_cost
 import numpy as np
 
 LEAST_SHARE = 0.05
@@ -230,12 +230,13 @@ def _stop(running: Plan, pose: FloatArray, jets: FloatArray, duration: float) ->
     arm, options = running.problem.arm, running.options
     own = OWN_LAWS.get(options.strategy)
     # Costates are those of a quadratic cost.
-    quadratic = options if own is None else replace(options, strategy=own.in_motion)
+    quadratic = with_quadratic_cost(options)
     here = jets[:, 0]
     low, high = (_end_costates(plan_to(here + probe, quadratic)) for probe in (0.0, PROBE))
     values = here + PROBE * low / (low - high)
-    if own is not None and own.stop is not None:
-        values[0] = own.stop(arm, options, duration, jets[0])
+    if own is None or own.stop is None:
+        return plan_to(values, quadratic)
+    values[0] = own.stop(arm, options, duration, jets[0])
     return plan_to(values, options)
 
 

@@ -14,7 +14,6 @@
 
 """Planning: a request turned into a certified plan, whatever kind of motion it asks for."""
 
-from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
@@ -47,7 +46,7 @@ from flat_planner_ros.core.planning.reference_trajectory import (
     RestToRestTrajectory,
 )
 from flat_planner_ros.core.planning.request import MotionRequest, planned_at_rest, PlanningOptions
-from flat_planner_ros.core.planning.strategies import OWN_LAWS, OwnMotion
+from flat_planner_ros.core.planning.strategies import OWN_LAWS, OwnMotion, with_quadratic_cost
 import numpy as np
 
 NO_DISTANCE = 1e-100
@@ -105,11 +104,9 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
 
 def _options_in_motion(options: PlanningOptions) -> PlanningOptions:
     """Return the options with the strategy that can start in motion."""
-    own = OWN_LAWS.get(options.strategy)
     # A running motion may have been planned with another flat map than the settings have now.
-    if own is None or (own.motion_from and options.flat_model is FlatModel.EXACT):
-        return options
-    return replace(options, strategy=own.in_motion)
+    is_exact = options.flat_model is FlatModel.EXACT
+    return options if is_exact else with_quadratic_cost(options)
 
 
 class _Certified(NamedTuple):
@@ -214,7 +211,7 @@ def _own_from_motion(
 ) -> OwnMotion | None:
     """Return the strategy's own motion of the first planned variable, if it has one."""
     own = OWN_LAWS.get(options.strategy)
-    if own is None or own.motion_from is None:
+    if own is None:
         return None
     return own.motion_from(problem.arm, options, problem.duration, start, final)
 

@@ -25,7 +25,7 @@ How to add a strategy:
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from types import MappingProxyType
 from typing import Protocol
@@ -39,7 +39,12 @@ from flat_planner_ros.core.arm import (
     InvalidRequest,
     PlanarArm,
 )
-from flat_planner_ros.core.insensitive import check_insensitivity, insensitive_motion
+from flat_planner_ros.core.insensitive import (
+    check_insensitivity,
+    insensitive_motion,
+    insensitive_motion_from,
+    InsensitiveMotion,
+)
 from flat_planner_ros.core.motion_law import Law, Strategy, strategy_cost
 from flat_planner_ros.core.peak import (
     check_peak,
@@ -98,13 +103,13 @@ class OwnLaw:
         Refuses an arm and options with which no motion can be planned.
     motion_from
         From the arm, the options, the duration [s], the derivatives 0 to 5 of the first planned
-        variable at the start [rad/s^k] and its value at the end [rad] to the motion; None where
-        `in_motion` stands in.
-    in_motion
-        Strategy of the same cost, which stands in where the start is in motion.
+        variable at the start [rad/s^k] and its value at the end [rad] to the motion.
+    stand_in
+        Strategy of the same cost, which stands in where the law cannot: where the motion that it
+        continues is of another flat map, and in a stop without `stop`.
     stop
         From the arm, the options, the duration [s] and the derivatives at the start, as above, to
-        the place where a stop takes least [rad]; None where that of `in_motion` serves.
+        the place where a stop takes least [rad]; None where that of `stand_in` serves.
     shortest
         From the arm, the options, the distance [rad] and the limit on the effort of joint n-1
         [N m] to the shortest duration from rest to rest within it [s]; None where a search has to
@@ -117,10 +122,8 @@ class OwnLaw:
 
     motion: Callable[[PlanarArm, PlanningOptions, float, float], OwnMotion]
     check: Callable[[PlanarArm, PlanningOptions], None]
-    motion_from: (
-        Callable[[PlanarArm, PlanningOptions, float, FloatArray, float], OwnMotion] | None
-    ) = None
-    in_motion: Strategy = Strategy.POLYNOMIAL
+    motion_from: Callable[[PlanarArm, PlanningOptions, float, FloatArray, float], OwnMotion]
+    stand_in: Strategy = Strategy.POLYNOMIAL
     stop: Callable[[PlanarArm, PlanningOptions, float, FloatArray], float] | None = None
     shortest: Callable[[PlanarArm, PlanningOptions, float, float], float] | None = None
     shortest_from: (
@@ -134,6 +137,21 @@ def _insensitive(
     """Return the insensitive motion; only the exact flat map tells what it leaves."""
     _check_flat_model(options)
     found = insensitive_motion(arm, duration, options.insensitivity, distance, options.drive)
+    return _of_insensitive(found)
+
+
+def _insensitive_from(
+    arm: PlanarArm, options: PlanningOptions, duration: float, start: FloatArray, final: float
+) -> OwnMotion:
+    """Return the same from a start in motion."""
+    found = insensitive_motion_from(
+        arm, duration, options.insensitivity, start, final, options.drive
+    )
+    return _of_insensitive(found)
+
+
+def _of_insensitive(found: InsensitiveMotion) -> OwnMotion:
+    """Return an insensitive motion as one of a strategy."""
     return OwnMotion(
         law=found.law,
         cost=found.cost,
@@ -212,7 +230,9 @@ def _shortest_least_peak_from(
 
 OWN_LAWS: Mapping[Strategy, OwnLaw] = MappingProxyType(
     {
-        Strategy.INSENSITIVE: OwnLaw(motion=_insensitive, check=_check_insensitive),
+        Strategy.INSENSITIVE: OwnLaw(
+            motion=_insensitive, check=_check_insensitive, motion_from=_insensitive_from
+        ),
         Strategy.MIN_PEAK_EFFORT: OwnLaw(
             motion=_least_peak,
             check=_check_least_peak,
@@ -262,6 +282,12 @@ def shortest_known(
     if own.shortest_from is None or effort >= limit or is_at_rest:
         return None
     return own.shortest_from(arm, options, start, final, limit)
+
+
+def with_quadratic_cost(options: PlanningOptions) -> PlanningOptions:
+    """Return options whose strategy is a cost and no more."""
+    own = OWN_LAWS.get(options.strategy)
+    return options if own is None else replace(options, strategy=own.stand_in)
 
 
 def check_options(arm: PlanarArm, options: PlanningOptions) -> None:

@@ -141,7 +141,7 @@ def accepted_status(
         message += f'; {doubt}'
     if motion.replaced_strategy is not None:
         level = DiagnosticStatus.WARN
-        message += f'; not {motion.replaced_strategy.value}, which only plans from rest'
+        message += f'; not {motion.replaced_strategy.value}, which needs flat_model: exact'
     if motion.exceeded is not None:
         use = motion.exceeded
         name = joints[use.joint]

@@ -377,13 +377,7 @@ def test_a_small_worst_case_by_default():
     assert left.worst <= 0.012
 
 
-def test_in_motion_and_at_rest_something_is_planned():
+def test_no_way_is_no_effort():
     options = PlanningOptions(strategy=Strategy.INSENSITIVE)
-    jets = np.zeros((1, 6))
-    jets[0, 1] = 0.1
-    moving = MotionRequest(
-        start=np.zeros(2), final=np.array([1.0, 0.0]), duration=1.0, start_jets=jets
-    )
-    assert plan(moving, ARM, options).sample(0.01).velocities[0, 0] == pytest.approx(0.1)
     resting = MotionRequest(start=np.zeros(2), final=np.zeros(2), duration=1.0)
     assert not plan(resting, ARM, options).sample(0.01).driving_effort.any()

@@ -17,12 +17,16 @@
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.insensitive.momentum_angle import (
-    CONTACT,
     momentum_basis,
-    response,
-    SPLIT_TURN,
+    UNIT_COURSE,
 )
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
+from flat_planner_ros.core.insensitive.response import (
+    CONTACT,
+    Normalised,
+    responses,
+    SPLIT_TURN,
+)
 import numpy as np
 from numpy.polynomial import legendre
 import pytest
@@ -40,6 +44,13 @@ def random_law(modes=16, seed=0):
         basis.second_start + basis.second_directions @ c,
         basis.least + c @ c,
     )
+
+
+def response(fourth, second, duration, start=UNIT_COURSE.start):
+    """Return the planned variable that follows one sigma."""
+    equation = Normalised.of(Oscillator.of(ARM), duration)
+    (law,) = responses(fourth[:, None], second[:, None], equation, duration, start)
+    return law
 
 
 @pytest.mark.parametrize('modes', [6, 16, 48])
@@ -62,7 +73,7 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
     fourth, second, _ = random_law(modes)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
     mapping = flat_map(ARM, FlatModel.EXACT)
-    law = response(fourth, second, Oscillator.of(ARM), duration)
+    law = response(fourth, second, duration)
     half = duration / 2.0
     inner, damped, coupled = mapping.effort[2:]
     sigma = legendre.legint(second, 2, lbnd=-1)
@@ -85,11 +96,38 @@ def test_the_planned_variable_answers_like_an_oscillator(modes, share):
         assert abs(start) < 1e-12 * np.abs(jet[order]).max()
 
 
+@pytest.mark.parametrize('share', [0.01, 0.2, 0.99, 1.01, 3.0])
+def test_a_start_in_motion_answers_like_an_oscillator(share):
+    fourth, second, _ = random_law()
+    duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
+    half = duration / 2.0
+    delta, epsilon = Normalised.of(Oscillator.of(ARM), duration)
+    # Any place and velocity; what follows from them and from sigma at the start is the jet.
+    sigma = legendre.legint(second, 2, lbnd=-1) + np.array([0.3, 0.8] + [0.0] * len(second))
+    jet = np.array([0.2, 0.5, 0.0, 0.0, 0.0, 0.0])
+    for order in range(4):
+        value = legendre.legval(-1.0, legendre.legder(sigma, order))
+        jet[order + 2] = (value - jet[order] - delta * jet[order + 1]) / epsilon
+    law = response(fourth, second, duration, jet)
+
+    def rates(x, state):
+        force = legendre.legval(x, sigma) - state[0] - delta * state[1]
+        return state[1], force / epsilon
+
+    x = np.linspace(-1.0, 1.0, 41)
+    solution = solve_ivp(rates, (-1, 1), jet[:2], 'DOP853', x, rtol=1e-11, atol=1e-13)
+    found = law.jet(half * (x + 1.0), 5)
+    assert found[0] == pytest.approx(solution.y[0], abs=1e-9 * np.abs(solution.y[0]).max())
+    for order in range(6):
+        miss = abs(found[order, 0] * half**order - jet[order])
+        assert miss < 1e-11 * np.abs(found[order]).max() * half**order
+
+
 @pytest.mark.parametrize('share', [0.2, 2.0])
 def test_derivatives_are_derivatives(share):
     fourth, second, _ = random_law(8)
     duration = share * SPLIT_TURN * len(fourth) / TURN_RATE
-    law = response(fourth, second, Oscillator.of(ARM), duration).transformed(2.0, 0.3)
+    law = response(fourth, second, duration).transformed(2.0, 0.3)
     t, h = np.linspace(0.1, 0.9, 9) * duration, 1e-5 * duration
     jet, after, before = law.jet(t, 8), law.jet(t + h, 8), law.jet(t - h, 8)
     slope = (after - before) / (2.0 * h)

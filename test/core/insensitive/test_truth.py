@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The prediction is the truth: a hundred random plans, drives and arms of their boxes."""
+"""The prediction is the truth: a hundred random plans, starts, drives and arms of their boxes."""
 
 import pytest
 from truth import truth

@@ -26,6 +26,7 @@ from flat_planner_ros.core.planning.duration_rules import OnViolation
 from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import PlanningOptions, Reason, RequestRejected
+from flat_planner_ros.core.planning.tradeoff import residual_of_plan
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import SimulatedArm
 from flat_planner_ros.core.session.execution import Outcome
@@ -152,22 +153,21 @@ def test_the_insensitive_strategy_refuses_via_points():
     assert 'insensitive' in str(error)
 
 
-def test_a_plan_says_by_which_strategy_it_was_really_planned():
+def test_a_start_in_motion_is_insensitive_and_a_stop_is_the_cheapest():
     options = PlanningOptions(strategy=Strategy.INSENSITIVE)
     planner = session(options=options)
     first = planner.submit(GOAL, NOW)
     assert first.plan.options.strategy is Strategy.INSENSITIVE
-    assert first.replaced_strategy is None
     second = planner.submit(BACK, NOW + 0.4)
-    assert second.plan.options.strategy is Strategy.POLYNOMIAL
-    assert second.replaced_strategy is Strategy.INSENSITIVE
+    assert second.plan.options.strategy is Strategy.INSENSITIVE
     plain = PlanningOptions(strategy=Strategy.POLYNOMIAL)
-    same = plan(second.plan.request, SETTINGS.arm, plain)
-    assert (same.sample(0.01).efforts == second.plan.sample(0.01).efforts).all()
+    other = plan(second.plan.request, SETTINGS.arm, plain)
+    left, left_by_other = residual_of_plan(second.plan), residual_of_plan(other)
+    assert left.worst < left_by_other.worst
     # At rest again, between the end of a motion and the start of one that waits.
     third = planner.submit(replace(GOAL, stamp=second.end + 1.0), NOW + 0.8)
     assert third.plan.options.strategy is Strategy.INSENSITIVE
-    assert third.replaced_strategy is None
+    assert planner.stop(third.start + 0.4).plan.options.strategy is Strategy.POLYNOMIAL
 
 
 def test_via_points_of_a_start_in_motion():

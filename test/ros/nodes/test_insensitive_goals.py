@@ -108,16 +108,16 @@ def test_bounds_are_kept_or_the_goal_is_rejected(graph):
     assert 'longer duration' in verdict['message']
 
 
-def test_a_start_in_motion_says_what_is_planned_instead(graph):
+def test_a_start_in_motion_is_planned_by_the_same_strategy(graph):
     planner = Resting(graph, strategy='insensitive', execute=True, **{'replan.lookahead': 1.0})
     verdict = planner.send(duration=4.0)
     assert verdict['level'] == DiagnosticStatus.OK
     assert verdict['strategy'] == 'insensitive'
     verdict = planner.send(angle=1.0, duration=4.0)
-    assert verdict['level'] == DiagnosticStatus.WARN
-    assert verdict['strategy'] == 'polynomial'
-    assert verdict['message'].startswith('plan 2: polynomial, 4 s')
-    assert 'not insensitive, which only plans from rest' in verdict['message']
+    assert verdict['level'] == DiagnosticStatus.OK
+    assert verdict['strategy'] == 'insensitive'
+    assert verdict['message'].startswith('plan 2: insensitive, 4 s')
+    assert float(verdict['predicted_residual_worst']) < 0.005
 
 
 @pytest.mark.parametrize(
