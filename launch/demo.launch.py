@@ -31,6 +31,9 @@ from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = 'flat_planner_ros'
 
+TRACKED = {'input': 'tracker', 'publish_rate': 500.0}
+"""Parameters of a plant that a tracker moves."""
+
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments that planner.launch.py has not, and start both."""
@@ -78,6 +81,7 @@ def _plant(context: LaunchContext) -> list[Node]:
     """Return the plant; with use_sim_time it makes the time that all others take."""
     overlay = LaunchConfiguration('overlay_file').perform(context)
     files = [LaunchConfiguration('params_file'), *([overlay] if overlay else [])]
+    is_tracked = LaunchConfiguration('tracker').perform(context) == 'true'
     use_sim_time = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
     return [
         Node(
@@ -87,7 +91,7 @@ def _plant(context: LaunchContext) -> list[Node]:
             namespace=LaunchConfiguration('namespace'),
             parameters=[
                 *(ParameterFile(file, allow_substs=True) for file in files),
-                {'publish_clock': use_sim_time},
+                {'publish_clock': use_sim_time, **(TRACKED if is_tracked else {})},
             ],
             ros_arguments=['--log-level', LaunchConfiguration('log_level')],
             output='screen',

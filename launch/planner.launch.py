@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Planner and monitor for a real arm, whose controller plays the command."""
+"""Planner and monitor for a real arm, whose controller plays the command, or a tracker."""
 
 import os
 from pathlib import Path
@@ -42,7 +42,7 @@ FORMS = {'position': 'planner_position.yaml'}
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Describe the arguments, the two nodes and what goes with them on demand."""
+    """Describe the arguments, the nodes and what goes with them on demand."""
     arm = PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'arm_2dof.yaml'])
     view = str(Path(__file__).with_name('view.launch.py'))
     return LaunchDescription(
@@ -79,6 +79,17 @@ def generate_launch_description() -> LaunchDescription:
                 'command_topic',
                 default_value='flat_arm_controller/joint_trajectory',
                 description="input of the arm's controller",
+            ),
+            DeclareLaunchArgument(
+                'tracker',
+                default_value='false',
+                choices=BOOLEAN,
+                description='close the loop: a tracker hears the command and sends efforts',
+            ),
+            DeclareLaunchArgument(
+                'effort_topic',
+                default_value='flat_tracker/effort_commands',
+                description='with tracker: input of the controller that takes efforts',
             ),
             DeclareLaunchArgument(
                 'view',
@@ -147,6 +158,17 @@ def _nodes(context: LaunchContext) -> list[Node]:
             **common,
         ),
         Node(executable='monitor_node', name='flat_monitor', parameters=parameters, **common),
+        Node(
+            executable='tracker_node',
+            name='flat_tracker',
+            parameters=parameters,
+            remappings=[
+                ('flat_planner/joint_trajectory', LaunchConfiguration('command_topic')),
+                ('~/effort_commands', LaunchConfiguration('effort_topic')),
+            ],
+            condition=IfCondition(LaunchConfiguration('tracker')),
+            **common,
+        ),
         Node(
             executable='record',
             parameters=[{'use_sim_time': _use_sim_time()}],

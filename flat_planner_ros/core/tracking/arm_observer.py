@@ -94,6 +94,11 @@ class ArmObserver:
         self._links.restart(sample.time, links_of(q), links_of(dq))
         self._joints.restart(sample.time, q[None, :-2], dq[None, :-2])
 
+    def continue_from(self, other: 'ArmObserver') -> None:
+        """Take over the estimate of another one, of the same joints."""
+        self._links.continue_from(other._links)
+        self._joints.continue_from(other._joints)
+
     def forget_disturbances(self) -> None:
         """Start the estimates of the disturbances anew."""
         self._links.forget_disturbance()

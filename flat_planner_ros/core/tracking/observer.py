@@ -80,6 +80,11 @@ class Observer:
         self._acting = np.zeros(self._columns)
         self._pending: list[_Input] = []
 
+    def continue_from(self, other: 'Observer') -> None:
+        """Take over the state, the disturbance and the inputs of another one."""
+        self.time, self.state = other.time, other.state
+        self._acting, self._pending = other._acting, list(other._pending)
+
     def forget_disturbance(self) -> None:
         """Start the estimate of the disturbance anew."""
         self.state[-1] = 0.0

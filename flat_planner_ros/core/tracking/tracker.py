@@ -108,6 +108,19 @@ class Tracker:
             )
         self._next = motion
 
+    def is_moving(self, now: float) -> bool:
+        """Tell whether a motion is under way or waits."""
+        return self._next is not None or (self._motion is not None and now < self._motion.end)
+
+    def continue_from(self, other: 'Tracker') -> None:
+        """Go on where another tracker of the same joints is, with one's own gains."""
+        self._observer.continue_from(other._observer)
+        self._motion, self._next, self.phase = other._motion, other._next, other.phase
+        self._heard, self._sent, self._released = other._heard, other._sent, other._released
+        self._efforts, self._last = other._efforts, other._last
+        self._clipped_since, self.error = other._clipped_since, other.error
+        self._fault = other._fault
+
     def release(self, now: float, fault: str = '') -> None:
         """Let the effort go to zero and be idle until the next command; for a fault, say why."""
         if self.phase is Phase.TRACKING or self._next is not None:

@@ -18,15 +18,18 @@ from collections.abc import Sequence
 import sys
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.core.arm import Drive, FlatPlannerError, FloatArray
 from flat_planner_ros.core.tracking import Tracker
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.nodes.rival_watch import RivalWatch
+from flat_planner_ros.ros.nodes.tracker_renewal import TrackerRenewal
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.tracker import build, ROWS
-from flat_planner_ros.ros.wire import conversions, interfaces, stamps
+from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.tracked_motion import tracked_motion
 from rclpy.clock import Clock, ClockType
@@ -41,6 +44,9 @@ LOOKS = 4
 LATE_LOOK = 2.0
 """Looks that come later, in terms of their period, say nothing: samples may be waiting [-]."""
 
+HEALTH_PERIOD = 1.0
+"""Time between two messages on `/diagnostics` [s]."""
+
 WARNING_PERIOD = 1.0
 """Shortest time between two warnings about the same input [s]."""
 
@@ -51,10 +57,11 @@ class TrackerNode(GuardedNode):
     def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.TRACKER, **options)
-        # Everything is fixed at the start: other gains are for an arm that is let go.
         settings = NodeParameters(self, ROWS, build, lambda _: None).settings
         self._joints = settings.joints
         self._tracker = Tracker(settings.arm, settings.tracker)
+        self._renewal = TrackerRenewal(settings.arm, settings.tracker)
+        self._fault = ''
         self._reader = JointStateReader(settings.joints)
         efforts = interfaces.EFFORT_COMMANDS
         self._efforts = self.create_publisher(Float64MultiArray, efforts, interfaces.RELIABLE)
@@ -63,13 +70,20 @@ class TrackerNode(GuardedNode):
         # As bytes: the points of a long command would take a second to become Python objects.
         listen(JointTrajectory, command, self._on_command, interfaces.RELIABLE, raw=True)
         listen(JointState, states, self._on_measured, interfaces.SENSOR_DATA)
+        status = interfaces.topic_of(interfaces.PLANNER, interfaces.STATUS)
+        listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
         self._watch = GraphWatch(self, self._log, [efforts, command], [states], is_listening=True)
+        self._rivals = RivalWatch(self, self._efforts, self._on_rival)
+        self._health = self.create_publisher(
+            DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE
+        )
         self.create_service(Trigger, interfaces.RELEASE, self._on_release)
         # A simulated clock can stand still; the effort must not hang on it.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looked = stamps.now(self._steady)
         self._look_period = settings.tracker.timeout / LOOKS
         self.create_timer(self._look_period, self._on_look, clock=self._steady)
+        self.create_timer(HEALTH_PERIOD, self._on_health, clock=self._steady)
         self._log.info(f'certified: {self._tracker.certificate.sentence}')
 
     @property
@@ -94,6 +108,7 @@ class TrackerNode(GuardedNode):
         try:
             points = conversions.points_of(data)
             self._tracker.follow(tracked_motion(points, self._joints, now), now)
+            self._fault = ''
         except FlatPlannerError as error:
             self._log.warning(f'command ignored: {error}')
 
@@ -109,6 +124,7 @@ class TrackerNode(GuardedNode):
             self._watch.heard_other_part()
         for remark in self._reader.take_remarks():
             self._log.warning(remark)
+        self._tracker = self._renewal.renewed(self._tracker, self._now())
         for sample in samples:
             self._send(self._tracker.hear(sample, max(self._now(), sample.time)))
 
@@ -119,6 +135,31 @@ class TrackerNode(GuardedNode):
         if elapsed <= LATE_LOOK * self._look_period:
             self._send(self._tracker.watch(self._now()))
 
+    def _on_status(self, msg: DiagnosticArray) -> None:
+        """Follow the model that the planner adopts, between motions."""
+        try:
+            self._renewal.adopt(diagnostics.adopted_values(msg))
+        except FlatPlannerError as error:
+            self._log.warning(f"the planner's model is not followed: {error}")
+
+    def _on_rival(self) -> None:
+        """Let go of an arm that somebody else moves, too."""
+        self._tracker.release(
+            self._now(), 'another node sends efforts, too; the effort goes to zero'
+        )
+
+    def _on_health(self) -> None:
+        """Say what the tracker does."""
+        self._renewal.adopt({})  # what has come while another one was made
+        refusal = self._renewal.take_refusal()
+        if refusal:
+            self._log.warning(refusal)
+        tracker = self._tracker
+        status = diagnostics.tracker_status(
+            tracker.phase.value, tracker.error, self._fault, tracker.certificate
+        )
+        self._health.publish(diagnostics.array_of(status, self._now()))
+
     def _on_release(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Let the arm go."""
         self._tracker.release(self._now())
@@ -128,9 +169,11 @@ class TrackerNode(GuardedNode):
     def _send(self, efforts: FloatArray | None) -> None:
         """Publish efforts, if there are any, and say why tracking was given up, if it was."""
         if efforts is not None:
+            self._rivals.sent(tuple(efforts.tolist()))
             self._efforts.publish(conversions.effort_msg(efforts))
         fault = self._tracker.take_fault()
         if fault:
+            self._fault = fault
             self._log.error(fault)
 
 

@@ -61,6 +61,9 @@ OURS = {
         interfaces.RESIDUAL: (JOINT_STATE, interfaces.RELIABLE),
         interfaces.REPORT: (DIAGNOSTIC_ARRAY, interfaces.LATCHED),
     },
+    interfaces.TRACKER: {
+        interfaces.EFFORT_COMMANDS: ('std_msgs/msg/Float64MultiArray', interfaces.RELIABLE),
+    },
 }
 """Topics of each of our nodes that are recorded, with their types and qualities."""
 

@@ -35,7 +35,14 @@ from flat_planner_ros.core.planning import (
     time_advice,
 )
 from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, Shortfall
-from flat_planner_ros.ros.wire.interfaces import ERROR_CODES, MODEL_NAME, REPORT_NAME, STATUS_NAME
+from flat_planner_ros.core.tracking import Certificate
+from flat_planner_ros.ros.wire.interfaces import (
+    ERROR_CODES,
+    MODEL_NAME,
+    REPORT_NAME,
+    STATUS_NAME,
+    TRACKER_NAME,
+)
 from flat_planner_ros.ros.wire.stamps import time_msg
 
 ECHO_LENGTH = 16
@@ -298,6 +305,36 @@ def monitor_status(
     return status_msg(
         REPORT_NAME, LEVELS[report.level], message, {**state, **_report_values(report)}
     )
+
+
+def tracker_status(
+    phase: str, error: float, fault: str, certificate: Certificate
+) -> DiagnosticStatus:
+    """
+    Return the present state of a tracker.
+
+    Parameters
+    ----------
+    phase
+        What it does.
+    error
+        Distance of the arm from the plan while it tracks [rad].
+    fault
+        Why tracking was given up last, until the next command; empty if it was not.
+    certificate
+        Of its loop.
+
+    """
+    is_tracking = phase == 'tracking'
+    message = f'{phase}, {error:.3g} rad from the plan' if is_tracking else phase
+    values: Values = {
+        'phase': phase,
+        'error': error if is_tracking else None,
+        'decay_rate': certificate.decay_rate,
+        'margin': certificate.margin,
+    }
+    level = DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK
+    return status_msg(TRACKER_NAME, level, f'{phase}; {fault}' if fault else message, values)
 
 
 def _report_values(report: VibrationReport) -> Values:

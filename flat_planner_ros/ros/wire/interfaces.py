@@ -54,6 +54,7 @@ REPORT = '~/report'
 STATUS_NAME = 'flat_planner: goal'
 MODEL_NAME = 'flat_planner: model'
 REPORT_NAME = 'flat_monitor: residual oscillation'
+TRACKER_NAME = 'flat_tracker: tracking'
 
 RELIABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Goals, commands and joint states: nothing is lost, nothing is kept for latecomers."""

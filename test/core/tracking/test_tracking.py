@@ -15,6 +15,7 @@
 """Motions of the paper's arm, and of an arm with weight, tracked against what no plan knows."""
 
 from dataclasses import replace
+from math import pi
 
 from core.conftest import ARM, envelope
 from core.tracking.closed_loop import ClosedLoop, motion_of, samples_of, settling
@@ -173,3 +174,25 @@ def test_known_friction_is_compensated(plan_of_paper):
     _, known, _, _ = tracked(plan_of_paper, rough, arm=rough, duration=1.1)
     _, unknown, _, _ = tracked(plan_of_paper, rough, duration=1.1)
     assert np.abs(known).max() < 0.5 * np.abs(unknown).max()
+
+
+def test_a_tracker_for_the_right_model_goes_on_where_the_other_one_holds():
+    true = ARM.scaled(stiffness=0.8, damping=0.8)
+    first, second = Tracker(ARM, SETTINGS), Tracker(true, SETTINGS)
+    loop = ClosedLoop(first, true, late=1)
+    loop.run(0.1)
+    first.follow(motion_of(samples_of(), loop.arm.time), loop.arm.time)
+    assert first.is_moving(loop.arm.time)
+    _, _, before = loop.run(2.0)
+    assert not first.is_moving(loop.arm.time)
+    second.continue_from(first)
+    loop.tracker = second
+    since = len(before)
+    _, positions, efforts = loop.run(0.5)
+    assert np.abs(efforts[since:]).max() < 0.1 * np.abs(before).max()
+    assert np.abs(positions[since:] - [pi, 0.0]).max() < 5e-3
+    begin = loop.arm.time
+    back = samples_of(true, start=[pi, 0.0], final=[0.0, 0.0])
+    second.follow(motion_of(back, begin), begin)
+    times, positions, _ = loop.run(1.5)
+    assert settling(times, positions, begin + 1.0) == 0.0

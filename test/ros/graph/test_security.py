@@ -23,13 +23,21 @@ from xml.etree import ElementTree
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
+from flat_planner_ros.ros.nodes.tracker_node import TrackerNode
 import pytest
 from rclpy.node import Node
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 POLICY_FILE = CHECKOUT / 'config' / 'sros2' / 'policy.xml'
 POLICY = ElementTree.parse(POLICY_FILE).getroot()
-NODES = {'flat_planner': PlannerNode, 'flat_plant': PlantNode, 'flat_monitor': MonitorNode}
+NODES = {
+    'flat_planner': PlannerNode,
+    'flat_plant': PlantNode,
+    'flat_monitor': MonitorNode,
+    'flat_tracker': TrackerNode,
+}
+LISTENS_TO_ITSELF = {'flat_tracker': {'/flat_tracker/effort_commands'}}
+"""Topics that a node hears only once somebody else publishes there."""
 
 
 def allowed(enclave, kind, right):
@@ -64,7 +72,8 @@ def test_sros2_can_read_the_policy():
 @pytest.mark.parametrize('name', NODES)
 def test_a_node_may_do_what_it_does_and_no_more(graph, name):
     used = {'publish': set(), 'subscribe': set(), 'reply': set()}
-    variants = {'flat_plant': [{'publish_clock': True}, {'input': 'effort'}]}
+    streams = [{'input': 'effort'}, {'input': 'tracker'}]
+    variants = {'flat_plant': [{'publish_clock': True}, *streams]}
     for parameters in ({}, {'use_sim_time': True}, *variants.get(name, [])):
         node = graph.create(NODES[name], parameters)
         for right, names in {
@@ -75,6 +84,7 @@ def test_a_node_may_do_what_it_does_and_no_more(graph, name):
             used[right] |= {topic for topic, _ in names}
         graph.remove(node)
     assert used['publish'] == allowed(name, 'topics', 'publish')
+    used['subscribe'] |= LISTENS_TO_ITSELF.get(name, set())
     assert used['subscribe'] == allowed(name, 'topics', 'subscribe')
     assert used['reply'] == allowed(name, 'services', 'reply')
 

@@ -16,6 +16,7 @@
 
 from math import pi, tau
 
+from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 import numpy as np
 from ros.rig import Rig, stamp, START_DELAY
@@ -114,6 +115,48 @@ def test_released_the_arm_is_let_go_until_the_next_command(graph):
     arm.wait_until(arm.end + 0.3)
     assert len(arm.sent) > count
     assert (arm.errors(arm.end + 0.2, 0.0) < 5e-3).all()
+
+
+def test_a_second_tracker_lets_go_of_an_arm_that_another_one_holds(graph):
+    arm = Tracked(graph)
+    arm.move(0.5)
+    arm.wait_until(arm.end + 0.1)
+    arm.start_tracker()
+    count = len(arm.sent)
+    arm.pass_time(0.3)
+    assert len(arm.sent) > count, 'the idle one disturbs nobody'
+    arm.move(0.0)
+    graph.expect(lambda: graph.logged('another node sends efforts'), 'an error')
+    arm.wait_until(arm.end + 0.3)
+    assert (arm.errors(arm.end + 0.2, 0.0) < 5e-3).all()
+    assert len(graph.logged('given up')) == 0
+
+
+def test_two_idle_trackers_both_let_go(graph):
+    arm = Tracked(graph)
+    arm.start_tracker()
+    arm.pass_time(0.3)
+    arm.move(0.5)
+    graph.expect(lambda: len(graph.logged('another node sends efforts')) == 2, 'both errors')
+    arm.pass_time(0.3)
+    count = len(arm.sent)
+    arm.pass_time(0.2)
+    assert len(arm.sent) == count
+
+
+def test_the_health_of_a_tracker_is_published(graph):
+    arm = Tracked(graph)
+    health = arm.hear(DiagnosticArray, '/diagnostics')
+    arm.move(0.5)
+
+    def phases():
+        ours = [m.status[0] for m in health if m.status[0].name == 'flat_tracker: tracking']
+        return [{pair.key: pair.value for pair in status.values} for status in ours]
+
+    graph.expect(lambda: any(v['phase'] == 'tracking' for v in phases()), 'a tracking tracker')
+    tracking = next(v for v in phases() if v['phase'] == 'tracking')
+    assert float(tracking['error']) < 0.05
+    assert float(tracking['margin']) > 0.2
 
 
 def test_a_motor_too_weak_for_the_motion_ends_in_one_error(graph):

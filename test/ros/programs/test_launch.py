@@ -28,7 +28,9 @@ import yaml
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 LAUNCH = CHECKOUT / 'launch'
-OWN = {'flat_planner_ros': ('planner_node', 'plant_node', 'monitor_node', 'record')}
+OWN = {
+    'flat_planner_ros': ('planner_node', 'plant_node', 'monitor_node', 'tracker_node', 'record')
+}
 VIEWERS = {
     'robot_state_publisher': ('robot_state_publisher',),
     'tf2_ros': ('static_transform_publisher',),
@@ -197,6 +199,16 @@ def test_a_real_arm_gets_the_command_on_its_controllers_topic(launched):
     }
     assert all(parameters(record)['drive'] == 'position' for record in records.values())
     assert 'is not installed' not in launched.output
+
+
+def test_a_tracker_closes_the_loop_where_it_is_wanted(launched):
+    records = launched.run('demo.launch.py', 'tracker:=true', names=[*NODES, 'flat_tracker'])
+    plant = parameters(records['flat_plant'])
+    assert (plant['input'], plant['publish_rate']) == ('tracker', 500.0)
+    rules = remappings(records['flat_tracker'])
+    command = remappings(records['flat_planner'])['~/joint_trajectory']
+    assert rules['flat_planner/joint_trajectory'] == command
+    assert rules['~/effort_commands'] == 'flat_tracker/effort_commands'
 
 
 @pytest.mark.parametrize('launched', [VIEWERS], indirect=True, ids=['viewers'])
