@@ -113,7 +113,6 @@ class PlannerSession:
         # Far back is no late message, but a clock that was set back.
         if not 0.0 < age <= self.settings.joint_state_timeout:
             self._recent.add(sample)
-            self._watch.follow(self.settings, self._timeline, sample)
 
     def knows_start(self, now: float) -> bool:
         """Tell whether goals can be judged: there is a time [s], and a state where one counts."""
@@ -121,9 +120,9 @@ class PlannerSession:
         is_known = self._recent.last is not None or self._timeline.is_busy(now) or not is_measured
         return now > 0.0 and is_known
 
-    def patience(self, goal: Goal) -> float:
+    def patience(self, goal: Goal, now: float) -> float:
         """
-        Return how long a goal may wait until its start is known [s].
+        Return how long a goal may wait until its start is known [s], until its stamp at most.
 
         Raises
         ------
@@ -133,7 +132,10 @@ class PlannerSession:
         """
         asked = checked_goal(goal, self.settings.joints)
         self.settings.checked_duration(asked.duration)
-        return self.settings.start_wait
+        left = self.settings.start_wait
+        if goal.stamp is not None:
+            left = min(left, goal.stamp - now - self.settings.start_delay)
+        return max(left, 0.0)
 
     def submit(self, goal: Goal, now: float, clock: Clock | None = None) -> Motion:
         """
@@ -259,6 +261,9 @@ class PlannerSession:
 
     def take_astray(self) -> list[Astray]:
         """Return, once, the motions under way that the arm has left."""
+        if self.measured is not None:
+            # Not with every sample: a comparison costs as much as hundreds of them.
+            self._watch.follow(self.settings, self._timeline, self.measured)
         return self._watch.take_astray()
 
     def track(self, now: float) -> Track:

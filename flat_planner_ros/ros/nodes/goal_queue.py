@@ -85,6 +85,6 @@ class GoalQueue:
         if self._session.knows_start(now):
             return 0.0
         try:
-            return self._session.patience(read())
+            return self._session.patience(read(), now)
         except (RequestRejected, MemoryError):  # its verdict says so
             return 0.0

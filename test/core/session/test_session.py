@@ -567,14 +567,18 @@ def test_only_goals_that_need_a_measured_state_wait_for_it(changes, is_known):
     assert not planner.knows_start(0.0)
     planner.measure(sample())
     assert planner.knows_start(NOW)
-    assert planner.patience(GOAL) == SETTINGS.start_wait
+    assert planner.patience(GOAL, NOW) == SETTINGS.start_wait
+    assert planner.patience(replace(GOAL, stamp=NOW + 1.0), NOW) == pytest.approx(0.95)
+    assert planner.patience(replace(GOAL, stamp=NOW), NOW) == 0.0
 
 
 def test_goals_that_break_a_rule_need_not_wait():
     planner = PlannerSession(SETTINGS)
-    assert reason_of(planner.patience, replace(GOAL, points=())).reason is Reason.EMPTY_GOAL
+    assert reason_of(planner.patience, replace(GOAL, points=()), NOW).reason is Reason.EMPTY_GOAL
     assert (
-        reason_of(planner.patience, replace(GOAL, points=(GoalPoint(time=0.0, positions=(1.0,)),)))
+        reason_of(
+            planner.patience, replace(GOAL, points=(GoalPoint(time=0.0, positions=(1.0,)),)), NOW
+        )
     ).reason is Reason.DURATION_OUT_OF_RANGE
 
 
