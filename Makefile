@@ -101,6 +101,7 @@ $(MADE):
 # not the one listed ends it all. The compiled messages of a ROS installation need the NumPy that
 # they were built with, hence ranges there too.
 $(DEPENDENCIES): setup.py pyproject.toml $(LOCK) $(MADE)
+	@echo 'installing what it needs into $(VENV) (about a minute)'
 	@$(if $(and $(LOCK),$(if $(ROS),,yes)), \
 	if $(PIP) --require-hashes -r $(LOCK) 2>$(VENV)/lock.log; then touch $@; exit 0; fi; \
 	if grep -i 'do not match the hashes' -A 8 $(VENV)/lock.log >&2; then exit 1; fi; \
@@ -132,6 +133,7 @@ $(SITE): setup.py $(DEPENDENCIES)
 # A removed source changes no time stamp, hence the list; and it would live on in build/lib.
 $(PACKAGE): $(DEPENDENCIES) $(VENV)/sources package.xml setup.cfg $(SOURCES)
 	@rm -rf build/lib build/bdist.* *.egg-info
+	@echo 'installing the package into $(VENV) (some seconds)'
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --force-reinstall .
 	@rm -rf build/lib build/bdist.* *.egg-info
 	@touch $@

@@ -65,6 +65,8 @@ class DurationRules:
         What becomes of a prescribed duration that is too short.
     shortest, longest
         Range of durations [s].
+    factor
+        Duration of a motion without one, relative to the shortest, at least 1 [-].
 
     """
 
@@ -73,6 +75,7 @@ class DurationRules:
     on_violation: OnViolation
     shortest: float
     longest: float
+    factor: float = 1.0
 
     def check_pose(self, which: str, positions: FloatArray) -> None:
         """
@@ -115,8 +118,8 @@ class DurationRules:
         request, arm, options
             The motion, as for `plan`.
         is_prescribed
-            Whether the request's duration is what is wanted; else the shortest that obeys the
-            limits is.
+            Whether the request's duration is what is wanted; else `factor` times the shortest that
+            obeys the limits is.
 
         Returns
         -------
@@ -140,7 +143,8 @@ class DurationRules:
         limit = float(self.limits.effort[-2])
         if not is_prescribed:
             bound = shortest_known(request, arm, options, limit)
-            return self._shortest(plan_of, self.shortest, bound=bound), None
+            found = self._shortest(plan_of, self.shortest, bound=bound)
+            return self._gentle(plan_of, found), None
         prescribed = plan(request, arm, options)
         use = self.limits.worst(prescribed)
         if use is None or not use.is_exceeded:
@@ -173,6 +177,15 @@ class DurationRules:
 
         """
         return self._shortest(plan_of, self.shortest, most=most)
+
+    def _gentle(self, plan_of: Callable[[float], Plan], shortest: Plan) -> Plan:
+        """Return the plan that takes `factor` times the shortest, unless a limit forbids that."""
+        duration = min(self.factor * shortest.duration, self.longest)
+        if duration <= shortest.duration:
+            return shortest
+        slower = plan_of(duration)
+        use = self.limits.worst(slower)
+        return shortest if use is not None and use.is_exceeded else slower
 
     def _shortest(
         self,

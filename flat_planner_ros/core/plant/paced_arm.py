@@ -129,7 +129,6 @@ class PacedArm:
     """
 
     def __init__(self, settings: SimulationSettings, time: float | None = None) -> None:
-        """Stand still."""
         self._settings = settings
         self._per_sample = settings.steps_per_sample
         self._simulated = SimulatedArm(
@@ -218,9 +217,10 @@ class PacedArm:
             )
         self._refuse_overtaken(profile, now)
         self._refuse_jump(profile, now)
-        self._play(profile)
         ahead = profile.start - now
-        if ahead < -self._simulated.step:
+        is_cut = ahead < -self._simulated.step and profile.differs(self._profile, now)
+        self._play(profile)
+        if is_cut:
             return f'it arrived {-1e3 * ahead:.1f} ms after its start; that part is left out'
         if ahead > FAR_AHEAD:
             return (

@@ -16,7 +16,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from flat_planner_ros.core.planning import Reason, RequestRejected
@@ -65,12 +65,27 @@ class Goal:
         Via points and, last, the final pose at rest.
     stamp
         Absolute time of the start [s]; None for as soon as possible.
+    start
+        Where the actuated joints are at the start, as the sender believes, in kinematic order
+        [rad]; None where nothing is said. Only a checked goal has it: a first point at time 0.
 
     """
 
     joint_names: tuple[str, ...]
     points: tuple[GoalPoint, ...]
     stamp: float | None = None
+    start: tuple[float, ...] | None = None
+
+    @property
+    def begins_with_start(self) -> bool:
+        """Tell whether the first point is the start: at time 0, and later ones have times."""
+        times = [point.time for point in self.points]
+        return len(times) > 1 and times[0] == 0.0 and any(times)
+
+    @property
+    def without_start(self) -> 'Goal':
+        """Return the goal without a first point that is the start."""
+        return replace(self, points=self.points[1:]) if self.begins_with_start else self
 
     @property
     def duration(self) -> float | None:
@@ -81,6 +96,9 @@ class Goal:
 def checked_goal(goal: Goal, joints: Sequence[str]) -> Goal:
     """
     Return a goal that obeys every rule, by all joints in kinematic order.
+
+    A first point at time 0 before points with times is the start, as motion planners send it: it
+    becomes the goal's `start`, and no rule is about its derivatives or its passive joint.
 
     Parameters
     ----------
@@ -98,13 +116,19 @@ def checked_goal(goal: Goal, joints: Sequence[str]) -> Goal:
     _check_joints(goal, joints)
     for index, point in enumerate(goal.points):
         _check_point(goal, index, point)
+    asked = goal.without_start
     _check_times(goal)
-    for point in goal.points:
-        _check_derivatives(goal, point)
+    for point in asked.points:
+        _check_derivatives(asked, point)
     points = tuple(
-        GoalPoint(time=point.time, positions=_angles(goal, point, joints)) for point in goal.points
+        GoalPoint(time=point.time, positions=_angles(asked, point, joints))
+        for point in asked.points
     )
-    return Goal(joint_names=tuple(joints), points=points, stamp=goal.stamp)
+    start = None
+    if goal.begins_with_start:
+        said = dict(zip(goal.joint_names, goal.points[0].positions, strict=True))
+        start = tuple(said[name] for name in joints[:-1])
+    return Goal(joint_names=tuple(joints), points=points, stamp=goal.stamp, start=start)
 
 
 def check_point_count(count: int) -> None:
@@ -159,7 +183,8 @@ def _check_point(goal: Goal, index: int, point: GoalPoint) -> None:
     for quantity in ('positions', 'velocities', 'accelerations'):
         values = getattr(point, quantity)
         if len(values) != count and (values or quantity == 'positions'):
-            message = f'point {index} has {len(values)} {quantity} for {count} joints'
+            names = ', '.join(goal.joint_names)
+            message = f'point {index} has {len(values)} {quantity} for {names}'
             raise RequestRejected(
                 Reason.SIZE_MISMATCH,
                 message,
@@ -239,13 +264,15 @@ def _check_times(goal: Goal) -> None:
         return
     previous = 0.0
     for index, time in enumerate(times):
+        if index == 0 and goal.begins_with_start:
+            continue
         if not time > previous:
             message = (
                 f'time_from_start must be zero in all points or increase from above zero, but '
                 f'point {index} has {time:g} s after {previous:g} s'
             )
             if time == 0.0:
-                message = f'time_from_start is zero in point {index}, but not in all points'
+                message = f'time_from_start is 0 s in point {index}, but not in all points'
             raise RequestRejected(
                 Reason.TIME_NOT_INCREASING, message, value=time, limit=previous, time=time
             )

@@ -39,6 +39,10 @@ AHEAD = 0.2
 """How far ahead of the present a state may be stamped, relative to the age that is stale [-]."""
 
 
+MAX_AHEAD = 3600.0
+"""Longest time to its start for which a goal is taken [s]: beyond, it came by another clock."""
+
+
 class MotionStart(NamedTuple):
     """
     Where a motion starts.
@@ -249,7 +253,16 @@ def _waiting(running: Motion, stamp: float | None) -> MotionStart:
 
 
 def check_stamp(stamp: float | None, now: float) -> None:
-    """Refuse a start in the past [s]."""
+    """Refuse a start in the past, or so far ahead that nobody waits for it [s]."""
+    if stamp is not None and stamp - now > MAX_AHEAD:
+        raise RequestRejected(
+            Reason.INVALID_GOAL,
+            f'the stamp {stamp:.3f} s lies {stamp - now:.0f} s ahead of the present {now:.3f} s, '
+            f'more than {MAX_AHEAD:g} s: do the sender and the planner go by the same clock '
+            f'(use_sim_time)?',
+            value=stamp,
+            limit=now + MAX_AHEAD,
+        )
     if stamp is not None and stamp < now:
         raise RequestRejected(
             Reason.OLD_HEADER_TIMESTAMP,

@@ -43,6 +43,7 @@ from flat_planner_ros.core.session.motion_start import (
     start_in_motion,
 )
 from flat_planner_ros.core.session.recent_states import RecentStates
+from flat_planner_ros.core.session.remarks import remarks_on, turns_remarks
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 
@@ -66,6 +67,8 @@ class PlannerSession:
     lack
         Why joint states that come in parts give no present sample, a clause; to be set by whoever
         reads them. Empty where they do.
+    source
+        Topic of joint states, which refusals for want of one name.
 
     """
 
@@ -74,6 +77,7 @@ class PlannerSession:
         self.settings = settings
         self.lack = ''
         self._recent = RecentStates()
+        self.source = 'joint_states'
         self._timeline = Timeline()
         self._motion: Motion | None = None
         self._ended: list[Ended] = []
@@ -166,11 +170,21 @@ class PlannerSession:
         start = self._start(goal.stamp, now)
         if start.running is not None:
             check_carried_out(settings, self._timeline, self._recent.last, now)
-        found, exceeded = plan_of_goal(settings, start, asked, duration)
-        motion = self._motion_of(found, start, now)
-        motion = replace(motion, is_shortest=found.duration != duration, exceeded=exceeded)
+        try:
+            found, exceeded = plan_of_goal(settings, start, asked, duration)
+        except RequestRejected as error:
+            turns = turns_remarks(settings, asked, start.pose)
+            raise replace(error, message='; '.join([error.message, *turns])) from error
+        is_gentle = duration is None and settings.duration_factor > 1.0
+        motion = replace(
+            self._motion_of(found, start, now),
+            is_shortest=found.duration != duration and not is_gentle,
+            duration_factor=settings.duration_factor if is_gentle else 1.0,
+            exceeded=exceeded,
+            remarks=tuple(remarks_on(settings, asked, start, now)),
+        )
         motion = self._accepted(motion, start, goal.stamp, clock)
-        self._last_goal = replace(goal, stamp=None)
+        self._last_goal = replace(goal.without_start, stamp=None)
         return motion
 
     def settle(self, now: float, clock: Clock | None = None) -> Motion | None:
@@ -335,8 +349,13 @@ class PlannerSession:
 
     def _start(self, stamp: float | None, now: float) -> MotionStart:
         """Return where a motion starts."""
+        lack = self.lack or (
+            f'no joint state of this arm has been received yet on {self.source}'
+            if self._recent.last is None
+            else f'does anything publish on {self.source}?'
+        )
         return motion_start(
-            self.settings, self._timeline, self._recent, self._last_pose, stamp, now, self.lack
+            self.settings, self._timeline, self._recent, self._last_pose, stamp, now, lack
         )
 
     @property

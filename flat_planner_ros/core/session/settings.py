@@ -26,6 +26,7 @@ from flat_planner_ros.core.planning import (
     Reason,
     RequestRejected,
 )
+import numpy as np
 
 LONGEST_FOUND = 3600.0
 """Longest duration that is looked for where the settings name none [s]."""
@@ -92,6 +93,9 @@ class SessionSettings:
         Spacing of a motion's samples [s].
     default_duration
         Duration of goals without times [s]; 0 for the shortest within the limits.
+    duration_factor
+        Duration of a goal that leaves it open, relative to the shortest within the limits, at
+        least 1 [-].
     min_duration, max_duration
         Range of durations that are accepted [s].
     limits
@@ -110,6 +114,8 @@ class SessionSettings:
         Time that a goal may wait for the first measured state [s]; 0 for none.
     when_moving
         What becomes of goals while the arm moves though nothing is planned.
+    far_ahead
+        Time to its start from which a goal's stamp looks as if it came by another clock [s].
     start_delay
         From accepting a goal without a stamp to its start, at rest [s].
     lookahead
@@ -139,6 +145,7 @@ class SessionSettings:
     options: PlanningOptions
     period: float = 0.005
     default_duration: float = 0.0
+    duration_factor: float = 1.0
     min_duration: float = 0.05
     max_duration: float = 600.0
     limits: JointLimits | None = None
@@ -150,6 +157,7 @@ class SessionSettings:
     joint_state_timeout: float = 0.5
     start_wait: float = 2.0
     when_moving: WhenMoving = WhenMoving.CATCH
+    far_ahead: float = 60.0
     start_delay: float = 0.05
     lookahead: float = 0.1
     replan_from: ReplanFrom = ReplanFrom.REFERENCE
@@ -218,8 +226,8 @@ class SessionSettings:
             limit = self.min_duration if below else self.max_duration
             raise RequestRejected(
                 Reason.DURATION_OUT_OF_RANGE,
-                f'duration {duration:g} s is outside [{self.min_duration:g}, '
-                f'{self.max_duration:g}] s',
+                f'duration {duration:g} s is {"below" if below else "above"} duration.'
+                f'{"min" if below else "max"} = {limit:g} s',
                 value=duration,
                 limit=limit,
             )
@@ -243,4 +251,12 @@ class SessionSettings:
             # A motion shorter than the spacing of its samples would be none.
             shortest=max(self.min_duration, self.period),
             longest=min(self.max_duration, LONGEST_FOUND),
+            factor=self.duration_factor,
+        )
+
+    def has_position_limits(self, joint: int) -> bool:
+        """Tell whether the angle of a joint, counted from 0, has a limit on both sides."""
+        limits = self.limits
+        return limits is not None and bool(
+            np.isfinite([limits.position_min[joint], limits.position_max[joint]]).all()
         )

@@ -58,10 +58,14 @@ class Motion:
         Whether it brings a motion of the same number, or an arm that moves by itself, to rest.
     is_shortest
         Whether its duration is the shortest within the limits, which was looked for.
+    duration_factor
+        How often it takes the shortest duration, where that was looked for [-].
     exceeded
         What the prescribed duration would have exceeded, if the motion was stretched.
     swing
         Amplitude of the measured swing that it starts from [rad]; None for another start.
+    remarks
+        Clauses on what looks like a mistake about the goal.
     replaced_strategy
         The strategy that was asked for, where the plan had to take another one.
 
@@ -78,6 +82,8 @@ class Motion:
     exceeded: LimitUse | None = None
     swing: float | None = None
     replaced_strategy: Strategy | None = None
+    remarks: tuple[str, ...] = ()
+    duration_factor: float = 1.0
 
     @property
     def end(self) -> float:

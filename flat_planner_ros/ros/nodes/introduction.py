@@ -21,8 +21,9 @@ from pathlib import Path
 
 from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.core.planning import JointLimits
+from flat_planner_ros.ros.parameters.limits import LIMITS
 from flat_planner_ros.ros.parameters.parameter_file import block_names, reaches
-from flat_planner_ros.ros.parameters.planner import LIMITS, PlannerSettings
+from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import interfaces
 from rclpy.node import Node

@@ -131,6 +131,8 @@ class MonitorNode(GuardedNode):
         """Take a plan, for whatever joints it names."""
         try:
             motion = conversions.planned_motion(conversions.points_of(data))
+            if not self._configuration.is_example:
+                conversions.check_passive_joint(motion, self.get_parameter('joints').value)
         except FlatPlannerError as error:
             self._log.warning(f'plan ignored: {error}')
             return

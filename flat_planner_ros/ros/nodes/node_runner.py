@@ -57,6 +57,9 @@ WITHOUT_LOG_FILE = ('--ros-args', '--disable-external-lib-logs')
 RCL = 'rcl'
 """Logger of the client library below rclpy."""
 
+ROS_FLAGS = ('--params-file', '-p', '--param', '-r', '--remap', '--log-level', '--enclave', '-e')
+"""Options that are for ROS, and mean nothing without --ros-args before them."""
+
 SPIN_PERIOD = 0.1
 """Longest wait in the executor [s]; without one an EventsExecutor would never run a callback."""
 
@@ -161,7 +164,11 @@ def _refuse_strays(args: Sequence[str]) -> None:
         epilog='ROS arguments follow --ros-args, e.g. --ros-args --params-file arm.yaml',
     )
     parser.add_argument('--version', action='version', version=version_line())
-    parser.parse_args(remove_ros_args(list(args))[1:])
+    _, strays = parser.parse_known_args(remove_ros_args(list(args))[1:])
+    if strays:
+        flag = next((stray for stray in strays if stray in ROS_FLAGS), None)
+        hint = '' if flag is None else f': put --ros-args before {flag}'
+        parser.error(f'unrecognized arguments: {" ".join(strays)}{hint}')
 
 
 @contextmanager

@@ -37,6 +37,7 @@ from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.verdict_text import log_line
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
@@ -55,6 +56,7 @@ class PlannerNode(GuardedNode):
         self._session = PlannerSession(self._settings.session)
         self._reader = JointStateReader(self._joints, self._settings.joint_states)
         self._goals = GoalQueue(self, self._session, self._answer)
+        self._session.source = self.resolve_topic_name(interfaces.JOINT_STATES)
         self._sent_start: float | None = None
         self._open_publishers()
         self._listen()
@@ -248,7 +250,8 @@ class PlannerNode(GuardedNode):
             DiagnosticStatus.WARN: self._log.warning,
             DiagnosticStatus.ERROR: self._log.error,
         }
-        say[status.level](status.message)
+        values = {pair.key: pair.value for pair in status.values}
+        say[status.level](log_line(status.message, values))
 
 
 def main(args: Sequence[str] | None = None) -> int:

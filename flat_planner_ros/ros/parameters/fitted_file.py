@@ -20,7 +20,7 @@ from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, PlanarArm
 from flat_planner_ros.core.model_fit import ModelFit
-from flat_planner_ros.ros.parameters.parameter_file import parsed
+from flat_planner_ros.ros.parameters.yaml_reader import parsed
 import numpy as np
 import yaml
 

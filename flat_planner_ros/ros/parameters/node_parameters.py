@@ -55,6 +55,13 @@ class NodeParameters(Generic[Settings]):
     apply
         Called with new settings after a change at run time.
 
+    Attributes
+    ----------
+    settings
+        What follows from the present values.
+    is_example
+        Whether no model was given, so that the arm is an example.
+
     Raises
     ------
     FlatPlannerError
@@ -81,6 +88,7 @@ class NodeParameters(Generic[Settings]):
         self.settings = self._checked({})
         for doubt in doubts(self._values({})):
             node.get_logger().warning(doubt)
+        self.is_example = bool(defaults)
         if defaults:
             node.get_logger().info("no model is given: this is the paper's arm")
         node.add_on_set_parameters_callback(self._validate)

@@ -35,23 +35,14 @@ from flat_planner_ros.ros.parameters.row import (
     Values,
     wrong_type,
 )
+from flat_planner_ros.ros.parameters.yaml_reader import parsed
 from rclpy.parameter import Parameter
-import yaml
 
 BLOCK = 'ros__parameters'
 """Key under which a parameter file lists a node's values."""
 
 ASSIGNMENT = ':='
 """Between name and value of an override, as ROS writes it."""
-
-
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
-    """Reads numbers as ROS does: 1e-4 is one, although YAML 1.1 asks for a decimal point."""
-
-
-_Loader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'^[-+]?\d+[eE][-+]?\d+$'), list('-+0123456789')
-)
 
 
 def read_settings(
@@ -148,15 +139,6 @@ def _content(path: Path) -> Mapping[str, Any]:
     if not isinstance(content, Mapping):
         raise InvalidParameter(f'{path} is no parameter file: it has no block for any node')
     return content
-
-
-def parsed(text: str, source: str) -> Any:
-    """Return YAML as Python values."""
-    try:
-        return yaml.load(text, _Loader)
-    except yaml.YAMLError as error:
-        reason = ' '.join(str(error).split())
-        raise InvalidParameter(f'{source} is not valid YAML: {reason}') from error
 
 
 def _blocks(

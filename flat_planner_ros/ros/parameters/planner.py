@@ -14,14 +14,13 @@
 
 """Parameters of the planner node."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import isqrt
 
 from flat_planner_ros.core.arm import Drive, FlatModel, JointStateRules
 from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy
-from flat_planner_ros.core.planning import check_options, JointLimits, OnViolation, PlanningOptions
+from flat_planner_ros.core.planning import check_options, OnViolation, PlanningOptions
 from flat_planner_ros.core.session import (
     ReplanFrom,
     SessionSettings,
@@ -32,10 +31,10 @@ from flat_planner_ros.core.session import (
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
+from flat_planner_ros.ros.parameters.limits import LIMIT_ROWS, limits_of
 from flat_planner_ros.ros.parameters.peak import peak_of, PEAK_ROWS
 from flat_planner_ros.ros.parameters.row import (
     DOUBLES,
-    InvalidParameter,
     Row,
     Values,
 )
@@ -84,9 +83,6 @@ class PlannerSettings:
     stream_effort: bool
 
 
-LIMITS = ('position_min', 'position_max', 'velocity', 'effort')
-"""Quantities that may be limited."""
-
 ROWS = [
     *MODEL_ROWS,
     Row(
@@ -128,54 +124,7 @@ ROWS = [
         '',
         'add to the efforts what friction.viscous and friction.coulomb take',
     ),
-    Row(
-        'duration.default',
-        SessionSettings.default_duration,
-        's',
-        'duration of goals without times',
-        '0 = the shortest within limits',
-        lower=0.0,
-    ),
-    Row('duration.min', SessionSettings.min_duration, 's', 'shortest duration', lower=0.0),
-    Row('duration.max', SessionSettings.max_duration, 's', 'longest duration', lower=0.0),
-    Row(
-        'limits.position_min',
-        DOUBLES,
-        'rad',
-        'lower position limits per joint',
-        '.inf = none',
-        may_be_infinite=True,
-    ),
-    Row(
-        'limits.position_max',
-        DOUBLES,
-        'rad',
-        'upper position limits per joint',
-        '.inf = none',
-        may_be_infinite=True,
-    ),
-    Row(
-        'limits.velocity',
-        DOUBLES,
-        'rad/s',
-        'velocity limits per joint',
-        '.inf = none',
-        may_be_infinite=True,
-    ),
-    Row(
-        'limits.effort',
-        DOUBLES,
-        'N m',
-        'effort limits per joint',
-        '.inf = none',
-        may_be_infinite=True,
-    ),
-    Row(
-        'limits.on_violation',
-        SessionSettings.on_violation,
-        '',
-        'what becomes of a motion that is too fast for the limits',
-    ),
+    *LIMIT_ROWS,
     Row(
         'sampling.period',
         SessionSettings.period,
@@ -223,6 +172,13 @@ ROWS = [
         'what becomes of a goal while the arm moves though nothing is planned',
     ),
     *JOINT_STATE_ROWS,
+    Row(
+        'start.far_ahead',
+        SessionSettings.far_ahead,
+        's',
+        'time to its start from which a goal is warned of',
+        lower=0.0,
+    ),
     Row(
         'start_delay',
         SessionSettings.start_delay,
@@ -332,7 +288,7 @@ def build(values: Values) -> PlannerSettings:
 
     """
     joints, arm = arm_of(values)
-    limits = _limits(values, joints)
+    limits = limits_of(values, joints)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
         r=values['weights.r'],
@@ -352,6 +308,7 @@ def build(values: Values) -> PlannerSettings:
         options=options,
         period=values['sampling.period'],
         default_duration=values['duration.default'],
+        duration_factor=values['duration.factor'],
         min_duration=values['duration.min'],
         max_duration=values['duration.max'],
         limits=limits,
@@ -363,6 +320,7 @@ def build(values: Values) -> PlannerSettings:
         joint_state_timeout=values['start.joint_state_timeout'],
         start_wait=values['start.wait'],
         when_moving=WhenMoving(values['start.moving']),
+        far_ahead=values['start.far_ahead'],
         start_delay=values['start_delay'],
         lookahead=values['replan.lookahead'],
         replan_from=ReplanFrom(values['replan.from']),
@@ -384,18 +342,6 @@ def build(values: Values) -> PlannerSettings:
         report_baselines=values['report_baselines'],
         stream_effort=values['stream_effort'],
     )
-
-
-def _limits(values: Values, joints: Sequence[str]) -> JointLimits:
-    """Return the limits of all joints."""
-    given = {name: values[f'limits.{name}'] for name in LIMITS if f'limits.{name}' in values}
-    for name, numbers in given.items():
-        if len(numbers) != len(joints):
-            raise InvalidParameter(
-                f'limits.{name} needs one number for each of {", ".join(joints)}, .inf where '
-                f'there is no limit; got {len(numbers)}'
-            )
-    return JointLimits.of(len(joints), **given)
 
 
 def _custom_cost(values: Values) -> np.ndarray | None:

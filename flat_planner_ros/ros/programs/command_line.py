@@ -28,6 +28,7 @@ import sys
 from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray
+from flat_planner_ros.ros.programs.angles import angle_of, FORMS
 from flat_planner_ros.ros.programs.outputs import STANDARD_OUTPUT
 from flat_planner_ros.version import version_line
 import numpy as np
@@ -86,14 +87,14 @@ class JointAngles(Action):
 
 
 def joint_angle(text: str) -> tuple[str, float]:
-    """Return a joint and its angle [rad] of `JOINT=RAD`."""
+    """Return a joint and its angle [rad] of `JOINT=RAD`, which may be written as in `angle_of`."""
     name, separator, value = text.partition('=')
     try:
         if name and separator:
-            return name, float(value)
+            return name, angle_of(value)
     except ValueError:
         pass
-    raise ArgumentTypeError(f'{text!r} is not JOINT=RAD, e.g. joint1=1.57')
+    raise ArgumentTypeError(f'{text!r} is not JOINT=RAD, e.g. joint1={FORMS}')
 
 
 def by_joint(angles: Iterable[tuple[str, float]]) -> dict[str, float]:
@@ -162,8 +163,7 @@ def split_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
 def explain_missing(error: ImportError, extra: str) -> int:
     """Say which extra a missing library comes with; return the exit code."""
     library = (error.name or 'a library').partition('.')[0]
-    remedy = f'pip install "flat_planner_ros[{extra}]", or {library} itself'
-    print(f'{library} is not installed: {remedy}', file=sys.stderr)
+    print(f'{library} is not installed: {_remedy(library, extra)}', file=sys.stderr)
     return 1
 
 
@@ -171,4 +171,9 @@ def missing_for_plot(path: str | None) -> str:
     """Return what a figure needs that is not installed, empty if nothing or no figure."""
     if path is None or find_spec('matplotlib') is not None:
         return ''
-    return '--plot needs matplotlib: pip install "flat_planner_ros[plot]"'
+    return f'--plot needs matplotlib: {_remedy("matplotlib", "plot")}'
+
+
+def _remedy(library: str, extra: str) -> str:
+    """Return how a library comes in, from the checkout or by itself."""
+    return f"pip install '.[{extra}]' in the checkout, or {library} itself"

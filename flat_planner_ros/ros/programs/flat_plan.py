@@ -37,6 +37,7 @@ from flat_planner_ros.core.session import (
 )
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import build, ROWS
+from flat_planner_ros.ros.programs.angles import FORMS
 from flat_planner_ros.ros.programs.command_line import (
     by_joint,
     explain_os,
@@ -49,12 +50,13 @@ from flat_planner_ros.ros.programs.command_line import (
 )
 from flat_planner_ros.ros.programs.outputs import open_text, summary_stream, write_through
 from flat_planner_ros.ros.wire import diagnostics, interfaces
+from flat_planner_ros.ros.wire.verdict_text import unit_of
 
 EXAMPLES = """
 examples:
-  flat_plan joint1=3.14159 --duration 1
+  flat_plan joint1=pi --duration 1
       the paper's arm, least effort
-  flat_plan joint1=1.5 --duration 0.8 --params-file my_arm.yaml --plot plan.png
+  flat_plan joint1=90deg --duration 0.8 --params-file my_arm.yaml --plot plan.png
       your own arm, with a figure
   flat_plan joint1=3.14159 --duration 1 -p strategy:=mixed -p weights.p:=20.0 --csv plan.csv
       another strategy, as points every sampling.period
@@ -107,6 +109,8 @@ def main(args: Sequence[str] | None = None) -> int:
         joints = settings.session.joints
         status = diagnostics.accepted_status(motion, goal, joints, elapsed)
         values = {pair.key: pair.value for pair in status.values}
+        for remark in motion.remarks:
+            print(f'flat_plan: {remark}', file=sys.stderr)
         _print_summary(motion, values, summary_stream(options.csv, options.json, options.plot))
         _write(options, joints, track, values)
     except RequestRejected as error:
@@ -136,7 +140,7 @@ def _parser() -> ArgumentParser:
         action=JointAngles,
         type=joint_angle,
         metavar='JOINT=RAD',
-        help='final angle of a joint [rad]',
+        help=f'final angle of a joint [rad], as {FORMS}',
     )
     parser.add_argument(
         '--duration',
@@ -231,7 +235,8 @@ def _print_summary(motion: Motion, values: Mapping[str, str], file: TextIO) -> N
     }
     width = max(map(len, shown))
     for key, value in shown.items():
-        print(f'  {key:{width}}  {value}', file=file)
+        unit = unit_of(key)
+        print(f'  {key:{width}}  {value}{" " if unit else ""}{unit}', file=file)
 
 
 def _write(

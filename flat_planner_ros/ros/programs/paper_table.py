@@ -121,13 +121,17 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'paper_table: no directory {Path(path).parent} for {path}', file=sys.stderr)
             return 1
     speed = 1.0 if options.real_time else SPEED
+    cases = BEYOND if options.beyond else CASES
+    # At once, for whoever waits at the end of a pipe.
+    about = f'{len(cases)} motions, {speed:g} times as fast as in real time'
+    print(about, file=summary, flush=True)
     try:
         with signals_caught() as interrupted, redirect_stdout(summary):
             arguments = None if args is None else list(args)
             os.environ.update(profile_environment(os.environ))  # for the nodes, too
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             refuse_company(interrupted)
-            results = _results(speed, BEYOND if options.beyond else CASES, interrupted)
+            results = _results(speed, cases, interrupted)
         print(REMARKS, file=summary, flush=True)
         if options.beyond:
             print(BEYOND_REMARKS, file=summary, flush=True)

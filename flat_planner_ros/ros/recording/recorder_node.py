@@ -47,8 +47,6 @@ NOT_SET = Parameter.Type.NOT_SET.value
 
 OURS = {
     interfaces.PLANNER: {
-        interfaces.GOAL: (JOINT_TRAJECTORY, interfaces.RELIABLE),
-        interfaces.GOAL_STATE: (JOINT_STATE, interfaces.RELIABLE),
         interfaces.COMMAND: (JOINT_TRAJECTORY, interfaces.RELIABLE),
         interfaces.EFFORT_COMMANDS: ('std_msgs/msg/Float64MultiArray', interfaces.RELIABLE),
         interfaces.PLAN: (JOINT_TRAJECTORY, interfaces.LATCHED),
@@ -65,7 +63,12 @@ OURS = {
         interfaces.EFFORT_COMMANDS: ('std_msgs/msg/Float64MultiArray', interfaces.RELIABLE),
     },
 }
-"""Topics of each of our nodes that are recorded, with their types and qualities."""
+"""
+Topics of each of our nodes that are recorded, with their types and qualities.
+
+Not the goals: whoever sends one and waits for a listener would take the recorder for the planner.
+Verdicts echo them.
+"""
 
 SHARED = {
     interfaces.JOINT_STATES: (JOINT_STATE, interfaces.RELIABLE),

@@ -24,7 +24,12 @@ from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
 from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
 from flat_planner_ros.ros.wire import stamps
-from flat_planner_ros.ros.wire.point_reader import FIELDS, PointTable, read_points
+from flat_planner_ros.ros.wire.point_reader import (
+    FIELDS,
+    joints_in_words,
+    PointTable,
+    read_points,
+)
 from flat_planner_ros.ros.wire.point_writer import trajectory_bytes
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -60,6 +65,7 @@ def points_of(data: bytes) -> PointTable:
 def points_of_message(msg: JointTrajectory) -> PointTable:
     """Return a trajectory as tables; arrays that do not fit the joints are told, not raised."""
     count, fields, misfits = len(msg.joint_names), {}, {}
+    words = joints_in_words(count)
     for field in FIELDS:
         rows = [getattr(point, field) for point in msg.points]
         width = count if any(map(len, rows)) else 0
@@ -67,7 +73,7 @@ def points_of_message(msg: JointTrajectory) -> PointTable:
         if odd is None:
             fields[field] = np.array(rows, dtype=float).reshape(len(rows), width)
         else:
-            misfits[field] = f'point {odd} has {len(rows[odd])} {field} for {count} joints'
+            misfits[field] = f'point {odd} has {len(rows[odd])} {field} for {words}'
     times = [stamps.seconds(point.time_from_start) for point in msg.points]
     return PointTable(
         joint_names=tuple(msg.joint_names),
@@ -174,6 +180,32 @@ def planned_motion(points: PointTable) -> PlannedMotion:
     )
 
 
+def check_passive_joint(motion: PlannedMotion, joints: Sequence[str]) -> None:
+    """
+    Refuse a motion of an arm in which other joints are actuated than here.
+
+    Parameters
+    ----------
+    motion
+        As planned; a joint that is not known here is nobody's motor.
+    joints
+        The joints here, the passive one last.
+
+    Raises
+    ------
+    InvalidRequest
+        The passive joint of one is a motor of the other.
+
+    """
+    theirs = motion.joint_names
+    for passive, motors in ((theirs[-1], joints[:-1]), (joints[-1], theirs[:-1])):
+        if passive in motors:
+            raise InvalidRequest(
+                f'it is of another arm: its joints are {", ".join(theirs)}, here they are '
+                f'{", ".join(joints)}, so that {passive} is passive on one side only'
+            )
+
+
 def effort_profile(
     points: PointTable, joints: Sequence[str], now: float, drive: Drive = Drive.EFFORT
 ) -> EffortProfile:
@@ -220,6 +252,7 @@ def effort_profile(
     }.items():
         if table is not None and not np.isfinite(table).all():
             raise InvalidCommand(f'{field} must be finite')
+    _refuse_other_passive_joint(names, joints, efforts, positions)
     actuated = joint_indices(names, joints[:-1])
     return EffortProfile(
         start=points.stamp or now,
@@ -228,6 +261,20 @@ def effort_profile(
         positions=None if positions is None else positions[:, actuated],
         velocities=None if velocities is None else velocities[:, actuated],
     )
+
+
+def _refuse_other_passive_joint(
+    names: Sequence[str], joints: Sequence[str], efforts: FloatArray, positions: FloatArray | None
+) -> None:
+    """Refuse a command that moves its last joint without an effort, where that is a motor here."""
+    if positions is None or names[-1] not in joints[:-1] or not efforts.any():
+        return
+    if (positions[:, -1] != positions[:1, -1]).any() and not efforts[:, -1].any():
+        raise InvalidCommand(
+            f'the command is for another arm: its joints are {", ".join(names)}, the last one '
+            f'passive (it moves without an effort), but here the joints are {", ".join(joints)}, '
+            f'and {names[-1]} is a motor'
+        )
 
 
 def command_bytes(

@@ -44,12 +44,7 @@ from flat_planner_ros.ros.wire.interfaces import (
     TRACKER_NAME,
 )
 from flat_planner_ros.ros.wire.stamps import time_msg
-
-ECHO_LENGTH = 16
-"""Most entries of a goal's list that a verdict repeats."""
-
-ECHO_CHARACTERS = 64
-"""Most characters of an entry that a verdict repeats."""
+from flat_planner_ros.ros.wire.verdict_text import clauses, list_text, precise, text_of
 
 LEVELS = {
     Level.OK: DiagnosticStatus.OK,
@@ -85,7 +80,7 @@ def status_msg(name: str, level: bytes, message: str, values: Values) -> Diagnos
         level=level,
         message=message,
         values=[
-            KeyValue(key=key, value=_text(value))
+            KeyValue(key=key, value=text_of(value))
             for key, value in values.items()
             if value is not None
         ],
@@ -149,6 +144,9 @@ def accepted_status(
     if motion.replaced_strategy is not None:
         level = DiagnosticStatus.WARN
         message += f'; not {motion.replaced_strategy.value}, which needs flat_model: exact'
+    if motion.remarks:
+        level = DiagnosticStatus.WARN
+    message += clauses(motion)
     if motion.exceeded is not None:
         use = motion.exceeded
         name = joints[use.joint]
@@ -165,8 +163,8 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
         'error_code': ERROR_CODES[error.reason],
         'error_name': error.reason.value,
         'joint': error.joint,
-        'value': _precise(error.value),
-        'limit': _precise(error.limit),
+        'value': precise(error.value),
+        'limit': precise(error.limit),
         'time': error.time,
         'duration_min': error.duration_min,
         **({} if goal is None else _goal_values(goal)),
@@ -444,28 +442,9 @@ def _goal_values(goal: Goal) -> Values:
     """Return the goal in brief: what it names, its final pose, its stamp."""
     final = goal.points[-1] if goal.points else None
     return {
-        'goal.joint_names': _list(goal.joint_names),
-        'goal.positions': _list(final.positions) if final else None,
+        'goal.joint_names': list_text(goal.joint_names),
+        'goal.positions': list_text(final.positions) if final else None,
         'goal.time_from_start': final.time if final else None,
         'goal.points': len(goal.points),
         'goal.stamp': 0.0 if goal.stamp is None else f'{goal.stamp:.9f}',
     }
-
-
-def _list(entries: Sequence[float | str]) -> str:
-    """Return the first entries of a list as text."""
-    shown = [_text(entry)[:ECHO_CHARACTERS] for entry in entries[:ECHO_LENGTH]]
-    more = ', ...' if len(entries) > ECHO_LENGTH else ''
-    return f'[{", ".join(shown)}{more}]'
-
-
-def _precise(value: float | None) -> str | None:
-    """Return a number that may be a time since 1970."""
-    return None if value is None else f'{value:.13g}'
-
-
-def _text(value: float | int | str) -> str:
-    """Return a number so that it reads well and is exact enough to compute with."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'{value:.9g}' if isinstance(value, float) else str(value)

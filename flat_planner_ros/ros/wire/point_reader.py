@@ -40,6 +40,11 @@ LENGTH, DOUBLE = 4, 8
 """Bytes of a sequence's length and of a number; each is aligned to its own size."""
 
 
+def joints_in_words(count: int) -> str:
+    """Return a number of joints in words."""
+    return '1 joint' if count == 1 else f'{count} joints'
+
+
 class PointTable(NamedTuple):
     """
     A trajectory, its points as tables.
@@ -71,7 +76,9 @@ class PointTable(NamedTuple):
             raise InvalidRequest(self.misfits[field])
         table, count = self.fields[field], len(self.joint_names)
         if len(table) and table.shape[1] != count:
-            raise InvalidRequest(f'point 0 has {table.shape[1]} {field} for {count} joints')
+            raise InvalidRequest(
+                f'point 0 has {table.shape[1]} {field} for {joints_in_words(count)}'
+            )
         return table.reshape(len(table), count)
 
     def optional_table(self, field: str) -> FloatArray | None:

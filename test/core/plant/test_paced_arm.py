@@ -275,7 +275,7 @@ def test_a_command_that_was_overtaken_is_refused_and_the_running_one_goes_on():
     arm, undisturbed = moving(), moving()
     with pytest.raises(InvalidCommand, match=r'overtaken: it starts 0\.050000 s before'):
         arm.command(swing(1.2))
-    assert arm.command(swing(1.25)) != ''  # the same once more is no matter
+    assert arm.command(swing(1.25)) == ''  # the same once more is no matter
     assert np.array_equal(last(lead_to(arm, 4.0)), last(lead_to(undisturbed, 4.0)))
     arm = PacedArm(SETTINGS, 1.0)
     arm.command(swing(5.0))
@@ -473,3 +473,26 @@ def test_clipped_steps_are_counted():
     assert trouble.startswith('effort clipped')
     # The sine is above half its peak for two thirds of its two seconds.
     assert int(trouble.split()[-2]) == pytest.approx(2000 * 2 / 3, abs=5)
+
+
+def test_a_command_that_repeats_the_running_one_until_now_is_no_loss():
+    arm = moving(until=2.0)
+    efforts = np.array(swing().efforts)
+    efforts[90:] *= 0.5  # from 2.15 s on
+    assert arm.command(replace(swing(), efforts=efforts)) == ''
+
+
+def test_a_command_that_should_have_begun_otherwise_is_a_loss():
+    other = replace(swing(), efforts=1.01 * swing().efforts)
+    assert 'after its start; that part is left out' in moving(until=2.0).command(other)
+    assert 'after its start' in PacedArm(SETTINGS, 1.5).command(swing())
+
+
+def test_what_asks_for_nothing_yet_is_no_loss():
+    times = np.linspace(0.0, 2.0, 201)
+    efforts = np.where(times < 1.0, 0.0, 1e-3 * np.sin(2 * np.pi * times))[:, None]
+    efforts[-1] = 0.0
+    profile = EffortProfile(start=1.25, times=times, efforts=efforts)
+    assert PacedArm(SETTINGS, 1.5).command(profile) == ''
+    moved = replace(profile, positions=1e-3 * times[:, None])
+    assert 'after its start' in PacedArm(SETTINGS, 1.5).command(moved)

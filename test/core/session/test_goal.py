@@ -156,11 +156,11 @@ BROKEN = {
         1.0,
     ),
     'mixed times': (
-        replace(GOAL, points=(replace(FINAL, time=0.0), FINAL)),
+        replace(GOAL, points=(FINAL, replace(FINAL, time=0.0))),
         Reason.TIME_NOT_INCREASING,
         None,
         0.0,
-        0.0,
+        1.0,
     ),
     'moving end': (
         with_point(velocities=(0.2,)),
@@ -233,6 +233,31 @@ def test_a_broken_rule_is_named_with_its_numbers(name):
     assert error.limit == pytest.approx(limit)
     for text in filter(None, (joint, None if value is None else f'{abs(value):g}')):
         assert text in str(error)
+
+
+def test_a_first_point_at_time_0_is_the_start():
+    present = GoalPoint(time=0.0, positions=(1e-5, 0.3), velocities=(2e-4, -1e-4))
+    via, final = (
+        GoalPoint(time=0.5, positions=(0.0, 0.4)),
+        GoalPoint(time=1.0, positions=(0.0, 1.0)),
+    )
+    goal = Goal(joint_names=JOINTS[::-1], points=(present, via, final))
+    checked = checked_goal(goal, JOINTS)
+    assert checked.start == (0.3,)
+    assert [point.positions for point in checked.points] == [(0.4, 0.0), (1.0, 0.0)]
+    assert checked.duration == 1.0
+
+
+def test_without_times_the_first_point_is_a_via_point():
+    points = tuple(GoalPoint(time=0.0, positions=(angle,)) for angle in (0.5, 1.0))
+    checked = checked_goal(replace(GOAL, points=points), JOINTS)
+    assert checked.start is None
+    assert len(checked.points) == 2
+
+
+def test_a_start_of_the_wrong_size_is_refused():
+    present = GoalPoint(time=0.0, positions=(0.0, 0.0))
+    assert rejection(replace(GOAL, points=(present, FINAL))).reason is Reason.SIZE_MISMATCH
 
 
 def test_a_foreign_name_is_repeated_in_part_only():

@@ -430,7 +430,7 @@ def test_a_missing_library_is_one_line(graph, tmp_path):
     process = graph.start('live_view', PYTHONPATH=paths)
     assert process.wait() == 1
     expected = (
-        'aiohttp is not installed: pip install "flat_planner_ros[live]", or aiohttp itself\n'
+        "aiohttp is not installed: pip install '.[live]' in the checkout, or aiohttp itself\n"
     )
     assert process.stderr == expected
 

@@ -69,7 +69,7 @@ def test_four_joints_in_a_vertical_plane_end_at_rest(graph):
     ('file', 'angles'), [('arm_3dof.yaml', [1.2, 0.8]), ('arm_4dof.yaml', [1.6, -0.6, 0.5])]
 )
 def test_a_goal_without_times_takes_the_shortest_motion_within_the_limits(graph, file, angles):
-    arm = Arm(graph, file)
+    arm = Arm(graph, file, planner={'duration.factor': 1.0})
     report = arm.report(angles, duration=0.0)
     (verdict,) = arm.verdicts('ACCEPTED')
     limits = arm.planner.get_parameters(['limits.velocity', 'limits.effort'])

@@ -491,3 +491,19 @@ def test_the_start_position_may_be_a_parameter(graph):
     assert verdict['state'] == 'ACCEPTED'
     graph.expect(lambda: planner.plans, 'the plan')
     assert planner.plans[0].points[0].positions[0] == 0.5
+
+
+def test_a_refusal_says_in_the_log_that_it_is_one(planner, graph):
+    planner.ask(goal(velocities=[0.5]))
+    graph.expect(lambda: graph.logged('goal rejected (NONZERO_END_STATE, -105)'), 'a line')
+
+
+def test_a_goal_that_is_reached_already_says_so(planner):
+    assert planner.ask(goal(0.0))['message'].endswith('the arm is there already')
+
+
+def test_what_looks_like_a_mistake_is_a_warning(planner):
+    verdict = planner.ask(goal(90.0, duration=10.0))
+    assert verdict['state'] == 'ACCEPTED'
+    assert verdict['level'] == DiagnosticStatus.WARN
+    assert '14.3 turns' in verdict['message']

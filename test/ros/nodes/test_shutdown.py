@@ -186,7 +186,9 @@ def test_a_program_says_that_it_is_ready_once(graph):
     states = graph.collect(JointState, '/joint_states', matched=False)
     graph.expect(lambda: len(states) > 50, 'a plant that goes on')
     assert process.stop() == 0
-    assert len(process.stderr.splitlines()) == 1
+    assert process.stderr.count('ready') == 1
+    # What it is, where its parameters come from, and that it is ready.
+    assert len(process.stderr.splitlines()) == 3
 
 
 BROKEN = {

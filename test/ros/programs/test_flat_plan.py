@@ -22,6 +22,7 @@ import subprocess
 import sys
 
 from flat_planner_ros.ros.programs import flat_plan
+from flat_planner_ros.ros.programs.angles import angle_of
 import numpy as np
 import pytest
 
@@ -32,7 +33,11 @@ def test_a_plan_is_summed_up(capsys):
     assert flat_plan.main(['joint1=3.14159265', '--duration', '1']) == 0
     shown = capsys.readouterr().out
     lines = dict(line.split(None, 1) for line in shown.splitlines()[1:])
-    assert float(lines['rms_effort.joint1']) == pytest.approx(0.007427, rel=1e-3)
+    assert float(lines['rms_effort.joint1'].removesuffix(' N m')) == pytest.approx(
+        0.007427, rel=1e-3
+    )
+    assert lines['duration'] == '1 s'
+    assert lines['predicted_residual'].endswith(' rad')
     assert lines['strategy'] == 'min_control_effort'
     assert float(lines['boundary_residual']) < 1e-9
 
@@ -108,3 +113,57 @@ def test_help_has_examples_that_work():
         [*command, f'joint1={pi}', '--duration', '1'], capture_output=True, text=True, check=True
     )
     assert 'rms_effort.joint1' in run.stdout
+
+
+@pytest.mark.parametrize(
+    ('text', 'angle'),
+    [
+        ('1.57', 1.57),
+        ('-1e-1', -0.1),
+        ('90deg', pi / 2.0),
+        ('-45°', -pi / 4.0),
+        ('pi', pi),
+        ('-pi/2', -pi / 2.0),
+        ('3*pi/4', 0.75 * pi),
+        ('2pi', 2.0 * pi),
+        ('1.5e0π/3', 0.5 * pi),
+        ('2rad', 2.0),
+    ],
+)
+def test_angles_as_people_write_them(text, angle):
+    assert angle_of(text) == pytest.approx(angle, rel=1e-15)
+
+
+@pytest.mark.parametrize('text', ['', 'deg', 'pie', 'pi/', '1.2.3pi', '90 deg 5', 'pi*2'])
+def test_what_is_no_angle_is_refused(text):
+    with pytest.raises(ValueError, match='float'):
+        angle_of(text)
+
+
+def test_degrees_and_parts_of_pi_are_taken(capsys):
+    assert flat_plan.main(['joint1=180deg', '--duration', '1', '--via', 'joint1=pi/2@0.5']) == 0
+    same = capsys.readouterr().out
+    assert (
+        flat_plan.main([f'joint1={pi}', '--duration', '1', '--via', f'joint1={pi / 2}@0.5']) == 0
+    )
+    assert float(_cost(same)) == pytest.approx(float(_cost(capsys.readouterr().out)), rel=1e-9)
+
+
+def _cost(text):
+    """Return the cost in a summary."""
+    return next(line.split()[1] for line in text.splitlines() if line.startswith('  cost'))
+
+
+def test_many_turns_are_remarked(capsys):
+    assert flat_plan.main(['joint1=90', '--duration', '5']) == 0
+    assert '14.3 turns; angles are in radians' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['plan.xyz', 'plan'])
+def test_an_unknown_kind_of_picture_is_refused_before_anything_is_planned(name, tmp_path, capsys):
+    with pytest.raises(SystemExit) as caught:
+        flat_plan.main(['joint1=1', '--duration', '1', '--plot', str(tmp_path / name)])
+    assert caught.value.code == 2
+    shown = capsys.readouterr()
+    assert 'ends in .png' in shown.err
+    assert not shown.out

@@ -74,3 +74,10 @@ def test_the_launch_file_starts_the_three_nodes(graph):
         'the three nodes',
     )
     process.stop(signal.SIGINT)
+
+
+def test_options_for_ros_without_ros_args_get_a_hint():
+    command = [str(script('planner_node')), '--params-file', 'arm.yaml']
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 2
+    assert 'put --ros-args before --params-file' in answer.stderr

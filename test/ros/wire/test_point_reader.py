@@ -18,7 +18,7 @@ import struct
 
 from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.core import FlatPlannerError
-from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.arm import InvalidCommand, InvalidRequest
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.ros.wire import conversions
 from flat_planner_ros.ros.wire.point_reader import FIELDS, read_points
@@ -215,3 +215,49 @@ def test_random_bytes_never_crash(data):
             conversions.points_of(data)
     else:
         assert_same(conversions.points_of(data), conversions.points_of_message(expected))
+
+
+def command(names, *, moves=True, effort=(1.0, 0.0)):
+    """Return a command of two points as tables."""
+    points = [
+        JointTrajectoryPoint(
+            time_from_start=Duration(sec=second),
+            positions=[0.0, 0.1 * second * moves],
+            effort=[(1 - second) * value for value in effort],
+        )
+        for second in range(2)
+    ]
+    return conversions.points_of_message(JointTrajectory(joint_names=names, points=points))
+
+
+def test_a_command_of_another_passive_joint_is_refused_with_both_lists():
+    arm = ['joint1', 'joint2', 'joint3']
+    with pytest.raises(InvalidCommand) as caught:
+        conversions.effort_profile(command(arm[:2]), arm, 5.0)
+    assert 'its joints are joint1, joint2,' in str(caught.value)
+    assert 'here the joints are joint1, joint2, joint3' in str(caught.value)
+    # A motor that is given an effort, or stands still, is none.
+    conversions.effort_profile(command(arm[:2], effort=(1.0, 0.5)), arm, 5.0)
+    conversions.effort_profile(command(arm[:2], moves=False), arm, 5.0)
+    conversions.effort_profile(command(arm[:2]), arm[:2], 5.0)
+
+
+def test_a_plan_of_another_passive_joint_is_refused_with_both_lists():
+    arm = ['joint1', 'joint2', 'joint3']
+
+    def planned(names):
+        still = JointTrajectoryPoint(positions=[0.0] * len(names), velocities=[0.0] * len(names))
+        end = JointTrajectoryPoint(
+            time_from_start=Duration(sec=1),
+            positions=[1.0] * len(names),
+            velocities=[0.0] * len(names),
+        )
+        msg = JointTrajectory(joint_names=names, points=[still, end])
+        msg.header.stamp.sec = 5
+        return conversions.planned_motion_from_trajectory(msg)
+
+    for there, here in ((arm[:2], arm), (arm, arm[:2])):
+        with pytest.raises(InvalidRequest, match='joint2 is passive on one side only'):
+            conversions.check_passive_joint(planned(there), here)
+    conversions.check_passive_joint(planned(arm), arm)
+    conversions.check_passive_joint(planned(['a', 'b']), arm)

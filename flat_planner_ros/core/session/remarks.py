@@ -1,0 +1,92 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What looks like a mistake about a goal that breaks no rule: units, stamps, another start."""
+
+from collections.abc import Iterator
+from math import pi
+
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.session.goal import Goal
+from flat_planner_ros.core.session.motion_start import MotionStart
+from flat_planner_ros.core.session.settings import SessionSettings
+import numpy as np
+
+ROUNDING = 1e-9
+"""Part of a turn that does not count as more than one [-]."""
+
+
+def remarks_on(
+    settings: SessionSettings, goal: Goal, start: MotionStart, now: float
+) -> Iterator[str]:
+    """
+    Return a clause on everything about a goal that looks like a mistake.
+
+    Parameters
+    ----------
+    settings
+        With limits and tolerances.
+    goal
+        A checked goal.
+    start
+        Where its motion starts.
+    now
+        Present time [s].
+
+    """
+    ahead = start.time - now
+    if goal.stamp is not None and ahead > settings.far_ahead:
+        yield (
+            f'it starts in {ahead:.0f} s only (start.far_ahead {settings.far_ahead:g} s): do the '
+            f'sender and the planner go by the same clock (use_sim_time)?'
+        )
+    yield from _remarks_on_start(settings, goal, start)
+    yield from turns_remarks(settings, goal, start.pose)
+
+
+def _remarks_on_start(settings: SessionSettings, goal: Goal, start: MotionStart) -> Iterator[str]:
+    """Return where the arm is elsewhere than a goal's first point at time 0 has it."""
+    if goal.start is None:
+        return
+    tolerance = settings.position_tolerance
+    for name, said, true in zip(settings.joints[:-1], goal.start, start.pose, strict=False):
+        if abs(said - true) > tolerance:
+            yield (
+                f'its first point, at time 0, has {name} at {said:.4g} rad, but the motion starts '
+                f'at {true:.4g} rad (start.position_tolerance {tolerance:g} rad)'
+            )
+
+
+def turns_remarks(settings: SessionSettings, goal: Goal, pose: FloatArray) -> Iterator[str]:
+    """
+    Return how many turns a joint is asked to make, if more than one and not within limits.
+
+    Parameters
+    ----------
+    settings
+        With position limits, which show that several turns are meant.
+    goal
+        A checked goal.
+    pose
+        Angles at the start of its motion, shape (n,) [rad].
+
+    """
+    poses = np.array([pose, *(point.positions for point in goal.points)])
+    turns = np.abs(np.diff(poses, axis=0)).max(axis=0) / (2.0 * pi)
+    for joint, name in enumerate(settings.joints[:-1]):
+        if turns[joint] > 1.0 + ROUNDING and not settings.has_position_limits(joint):
+            yield (
+                f'{name} is asked to make {turns[joint]:.3g} turns; angles are in radians, 90 '
+                f'degrees are 1.5708'
+            )
