@@ -103,6 +103,16 @@ def servo(ran):
     assert own < 1.02 * max(ran['worst'].values())
 
 
+def least_time(ran):
+    fastest = ran['motions'][Strategy.MIN_PEAK_EFFORT]
+    others = [
+        m for strategy, m in ran['motions'].items() if strategy is not fastest.options.strategy
+    ]
+    assert fastest.duration < 0.9 * min(motion.duration for motion in others)
+    assert fastest.duration < 1.02 * fastest.least_duration
+    assert max(ran['left'].values()) < 1e-5
+
+
 CLAIMS = [
     first_motion,
     strategies,
@@ -115,6 +125,7 @@ CLAIMS = [
     own_arm,
     on_a_controller,
     servo,
+    least_time,
 ]
 
 
@@ -145,7 +156,7 @@ def test_an_example_is_one_page_and_shown(path):
 
 
 def test_examples_are_numbered_and_use_the_public_list():
-    assert [path.name[:2] for path in EXAMPLES] == [f'{i:02}' for i in range(1, 12)]
+    assert [path.name[:2] for path in EXAMPLES] == [f'{i:02}' for i in range(1, 13)]
     for path in EXAMPLES:
         private = re.findall(r'flat_planner_ros\.core\.\w+', path.read_text('utf-8'))
         assert not private
