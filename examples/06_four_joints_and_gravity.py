@@ -34,6 +34,7 @@ from flat_planner_ros.core import (
     shortest_plan,
     Strategy,
 )
+from flat_planner_ros.core.plant import DriveSettings
 from matplotlib import pyplot as plt
 import numpy as np
 
@@ -75,8 +76,7 @@ played = rollout(
     command,
     until=motion.duration + 1.0,
     position=request.start,
-    feedback_p=(50.0, 50.0, 0.0),
-    feedback_d=(5.0, 5.0, 0.0),
+    drives=DriveSettings(feedback_p=(50.0, 50.0, 0.0), feedback_d=(5.0, 5.0, 0.0)),
 )
 use = limits.worst(motion)
 left = np.abs(played.positions[played.times >= motion.duration] - motion.request.final).max()

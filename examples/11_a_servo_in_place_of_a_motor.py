@@ -35,6 +35,7 @@ from flat_planner_ros.core import (
     rollout,
     Strategy,
 )
+from flat_planner_ros.core.plant import DriveSettings
 from matplotlib import pyplot as plt
 import numpy as np
 
@@ -57,7 +58,7 @@ def left(motion, true_arm, drive):
         positions=samples.positions[:, :-1],
         velocities=samples.velocities[:, :-1],
     )
-    played = rollout(true_arm, command, until=1.8, step=2e-3, drive=drive)
+    played = rollout(true_arm, command, until=1.8, step=2e-3, drives=DriveSettings(drive=drive))
     return np.abs(played.positions[played.times >= motion.duration, 1]).max()
 
 

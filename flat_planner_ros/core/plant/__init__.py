@@ -14,6 +14,7 @@
 
 """Plant: a simulated arm that plays commands by time; it knows nothing of planning."""
 
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.paced_arm import PacedArm
 from flat_planner_ros.core.plant.settings import Sensing, SimulationSettings
@@ -21,6 +22,7 @@ from flat_planner_ros.core.plant.simulation import ArmState, rollout, SimulatedA
 
 __all__ = [
     'ArmState',
+    'DriveSettings',
     'EffortProfile',
     'PacedArm',
     'rollout',

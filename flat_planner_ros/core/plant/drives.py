@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 from math import inf, pi
 
-from flat_planner_ros.core.arm import FloatArray, InvalidModel, PlanarArm
+from flat_planner_ros.core.arm import Drive, FloatArray, InvalidModel, PlanarArm
 from flat_planner_ros.core.plant.effort_profile import JointReference
 import numpy as np
 import numpy.typing as npt
@@ -69,6 +69,32 @@ class Servo:
         return reference.acceleration + own**2 * error + 2.0 * own * lag
 
 
+@dataclass(frozen=True, kw_only=True)
+class DriveSettings:
+    """
+    What the motors of an arm are and do.
+
+    Attributes
+    ----------
+    drive
+        What a command's points are: efforts, or positions that servos follow.
+    servo_bandwidth
+        Of those servos [Hz], 0 for ideal ones.
+    saturation
+        Largest effort of each motor, n-1 of them [N m]; None if unlimited.
+    feedback_p, feedback_d
+        Gains on position and velocity errors, n-1 each [N m/rad], [N m s/rad]; None for none.
+        They act where a command has positions.
+
+    """
+
+    drive: Drive = Drive.EFFORT
+    servo_bandwidth: float = 0.0
+    saturation: tuple[float, ...] | None = None
+    feedback_p: tuple[float, ...] | None = None
+    feedback_d: tuple[float, ...] | None = None
+
+
 class Drives:
     """
     The motors of the actuated joints.
@@ -80,13 +106,10 @@ class Drives:
     ----------
     arm
         What they move.
-    saturation
-        Largest effort of each motor, shape (n-1,) [N m]; unlimited by default.
-    feedback_p, feedback_d
-        Gains on position and velocity errors, shape (n-1,) [N m/rad], [N m s/rad]; zeros by
-        default. They act where a command has positions.
-    servo
-        What follows positions in the place of efforts and feedback, if anything does.
+    settings
+        What they are.
+    step
+        Integration step of the arm [s].
 
     Raises
     ------
@@ -95,24 +118,18 @@ class Drives:
 
     """
 
-    def __init__(
-        self,
-        arm: PlanarArm,
-        *,
-        saturation: npt.ArrayLike | None = None,
-        feedback_p: npt.ArrayLike | None = None,
-        feedback_d: npt.ArrayLike | None = None,
-        servo: Servo | None = None,
-    ) -> None:
+    def __init__(self, arm: PlanarArm, settings: DriveSettings, step: float) -> None:
         """Apply nothing but what carries the weight."""
         motors = arm.n - 1
-        self._saturation = _per_motor('saturation', saturation, motors, inf, 'N m')
-        self._feedback_p = _per_motor('feedback_p', feedback_p, motors, 0.0, 'N m/rad')
-        self._feedback_d = _per_motor('feedback_d', feedback_d, motors, 0.0, 'N m s/rad')
+        self._saturation = _per_motor('saturation', settings.saturation, motors, inf, 'N m')
+        self._feedback_p = _per_motor('feedback_p', settings.feedback_p, motors, 0.0, 'N m/rad')
+        self._feedback_d = _per_motor('feedback_d', settings.feedback_d, motors, 0.0, 'N m s/rad')
         self._is_limited = bool(np.isfinite(self._saturation).any())
         self.has_feedback = bool(self._feedback_p.any() or self._feedback_d.any())
-        self.servo = servo
-        """What follows positions."""
+        self.servo: Servo | None = None
+        """What follows positions in the place of efforts and feedback, if anything does."""
+        if settings.drive is Drive.POSITION:
+            self.servo = Servo(bandwidth=settings.servo_bandwidth, step=step)
         self.arm = arm
         """What they move; may be replaced."""
         nothing, missing = np.zeros(motors), np.full(motors, np.nan)

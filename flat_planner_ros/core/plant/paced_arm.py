@@ -135,11 +135,7 @@ class PacedArm:
             settings.arm,
             position=settings.position,
             step=settings.true_step,
-            saturation=settings.saturation,
-            feedback_p=settings.feedback_p,
-            feedback_d=settings.feedback_d,
-            drive=settings.drive,
-            servo_bandwidth=settings.servo_bandwidth,
+            drives=settings.drives,
         )
         self._sensor = Sensor(settings.sensing)
         # The arm's own time starts at 0, where floating-point numbers resolve it best.

@@ -17,8 +17,8 @@
 from dataclasses import dataclass, field
 from math import ceil
 
-from flat_planner_ros.core.arm import check_number, Drive, InvalidModel, PlanarArm
-from flat_planner_ros.core.plant.drives import Servo
+from flat_planner_ros.core.arm import check_number, InvalidModel, PlanarArm
+from flat_planner_ros.core.plant.drives import Drives, DriveSettings
 from flat_planner_ros.core.plant.simulation import ArmState, GRID_TOLERANCE
 import numpy as np
 
@@ -103,8 +103,8 @@ class SimulationSettings:
         Samples per second of simulated time [Hz].
     step
         Longest integration step [s]; the step taken divides the time between samples.
-    saturation, feedback_p, feedback_d, drive, servo_bandwidth
-        As in SimulatedArm.
+    drives
+        What the motors are.
     sensing
         Imperfections of the sensors.
     start_tolerance
@@ -119,11 +119,7 @@ class SimulationSettings:
     position: tuple[float, ...]
     rate: float = 200.0
     step: float = 1e-3
-    saturation: tuple[float, ...] | None = None
-    feedback_p: tuple[float, ...] | None = None
-    feedback_d: tuple[float, ...] | None = None
-    drive: Drive = Drive.EFFORT
-    servo_bandwidth: float = 0.0
+    drives: DriveSettings = field(default_factory=DriveSettings)
     sensing: Sensing = field(default_factory=Sensing)
     start_tolerance: float = 0.05
     input_timeout: float = 0.1
@@ -136,7 +132,7 @@ class SimulationSettings:
             raise InvalidModel(
                 f'start_tolerance must be at least 0 rad, got {self.start_tolerance}'
             )
-        Servo(bandwidth=self.servo_bandwidth, step=self.true_step)
+        Drives(self.arm, self.drives, self.true_step)
 
     @property
     def true_step(self) -> float:

@@ -20,13 +20,12 @@ from typing import Any, NamedTuple
 from flat_planner_ros.core.arm import (
     check_number,
     checked_array,
-    Drive,
     FloatArray,
     InvalidCommand,
     InvalidModel,
     PlanarArm,
 )
-from flat_planner_ros.core.plant.drives import Drives, Servo
+from flat_planner_ros.core.plant.drives import Drives, DriveSettings
 from flat_planner_ros.core.plant.effort_profile import (
     check_bound,
     EffortProfile,
@@ -42,6 +41,10 @@ GRID_TOLERANCE = 1e-6
 
 MAX_SPEED = 10 * MAX_VELOCITY
 """Joint velocity beyond which an arm is stopped: efforts, gains or steps make no sense [rad/s]."""
+
+
+UNLIMITED = DriveSettings()
+"""Motors that give every effort that is commanded."""
 
 
 class ArmState(NamedTuple):
@@ -82,11 +85,8 @@ class SimulatedArm:
         Time at the start [s].
     step
         Integration step [s].
-    saturation, feedback_p, feedback_d
-        As in Drives.
-    drive, servo_bandwidth
-        What a command's points are: efforts, or positions that servos follow with a bandwidth
-        [Hz], 0 for ideal ones.
+    drives
+        What its motors are; by default they give every effort that is commanded.
 
     Raises
     ------
@@ -102,19 +102,12 @@ class SimulatedArm:
         position: npt.ArrayLike | None = None,
         time: float = 0.0,
         step: float = 1e-3,
-        saturation: npt.ArrayLike | None = None,
-        feedback_p: npt.ArrayLike | None = None,
-        feedback_d: npt.ArrayLike | None = None,
-        drive: Drive = Drive.EFFORT,
-        servo_bandwidth: float = 0.0,
+        drives: DriveSettings = UNLIMITED,
     ) -> None:
         """Stand still at the position."""
         check_number('step', step, 's', above=0.0)
         check_number('time', time, 's')
-        servo = Servo(bandwidth=servo_bandwidth, step=step) if drive is Drive.POSITION else None
-        self._drives = Drives(
-            arm, saturation=saturation, feedback_p=feedback_p, feedback_d=feedback_d, servo=servo
-        )
+        self._drives = Drives(arm, drives, step)
         self._origin, self._step = float(time), float(step)
         self._count = 0
         self._clipped_steps = 0

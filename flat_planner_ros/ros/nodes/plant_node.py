@@ -77,7 +77,7 @@ class PlantNode(GuardedNode):
     @property
     def introduction(self) -> str:
         """Return what the node does, for its log."""
-        arm = arm_sentence(self._settings.joints, self._settings.simulation.drive)
+        arm = arm_sentence(self._settings.joints, self._settings.simulation.drives.drive)
         return f'{arm}; hears {self.resolve_topic_name(self._commands)}'
 
     @property
@@ -117,7 +117,7 @@ class PlantNode(GuardedNode):
                     'it is empty; to end a motion call ~/reset, or ~/stop of the planner'
                 )
             joints = self._settings.joints
-            drive = self._settings.simulation.drive
+            drive = self._settings.simulation.drives.drive
             profile = conversions.effort_profile(points, joints, self._arm.time, drive)
             remark = self._arm.command(profile)
         except FlatPlannerError as error:

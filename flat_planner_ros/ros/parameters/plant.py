@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from flat_planner_ros.core.arm import Drive
-from flat_planner_ros.core.plant import Sensing, SimulationSettings
+from flat_planner_ros.core.plant import DriveSettings, Sensing, SimulationSettings
 from flat_planner_ros.ros.parameters.arm_model import arm_of, FIXED_MODEL_ROWS, per_joint
 from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row, Values
 
@@ -187,7 +187,7 @@ ROWS = [
     ),
     Row(
         'servo.bandwidth',
-        SimulationSettings.servo_bandwidth,
+        DriveSettings.servo_bandwidth,
         'Hz',
         'with drive position: how fast a joint follows, critically damped',
         '0 = ideal',
@@ -250,11 +250,13 @@ def build(values: Values) -> PlantSettings:
         position=per_joint(values, 'initial_position', n, 'joint') or (0.0,) * n,
         rate=values['publish_rate'],
         step=values['integration_step'],
-        saturation=per_joint(values, 'torque.saturation', n - 1),
-        feedback_p=per_joint(values, 'feedback.p', n - 1),
-        feedback_d=per_joint(values, 'feedback.d', n - 1),
-        drive=Drive(values['drive']),
-        servo_bandwidth=values['servo.bandwidth'],
+        drives=DriveSettings(
+            drive=Drive(values['drive']),
+            servo_bandwidth=values['servo.bandwidth'],
+            saturation=per_joint(values, 'torque.saturation', n - 1),
+            feedback_p=per_joint(values, 'feedback.p', n - 1),
+            feedback_d=per_joint(values, 'feedback.d', n - 1),
+        ),
         sensing=Sensing(
             position_std=values['noise.position_std'],
             seed=values['noise.seed'],

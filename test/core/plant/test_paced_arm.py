@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from flat_planner_ros.core.arm.errors import InvalidCommand, InvalidModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.paced_arm import (
     BATCH,
@@ -367,7 +368,7 @@ def test_efforts_without_measure_stop_the_arm_in_finite_numbers(effort):
 
 
 def test_gains_or_friction_too_large_for_the_step_stop_the_arm_too():
-    stiff = replace(SETTINGS, feedback_p=(1e6,), feedback_d=(1e6,))
+    stiff = replace(SETTINGS, drives=DriveSettings(feedback_p=(1e6,), feedback_d=(1e6,)))
     arm = PacedArm(stiff, 1.0)
     arm.command(located(1.0, 1e-3))
     assert np.isfinite([np.concatenate(s[1:]) for s in lead_to(arm, 2.0)]).all()
@@ -466,7 +467,7 @@ def test_settings_without_meaning_are_refused(change):
 
 
 def test_clipped_steps_are_counted():
-    arm = moving(1.0, replace(SETTINGS, saturation=(5e-4,)))
+    arm = moving(1.0, replace(SETTINGS, drives=DriveSettings(saturation=(5e-4,))))
     samples = lead_to(arm, 3.5)
     assert max(abs(sample.effort[0]) for sample in samples) == 5e-4
     (trouble,) = arm.take_warnings()

@@ -21,6 +21,7 @@ from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.planning.tradeoff import residual_of_plan
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.settings import SimulationSettings
 from flat_planner_ros.core.plant.simulation import rollout, SimulatedArm
@@ -34,7 +35,11 @@ def planned(arm, strategy=Strategy.INSENSITIVE):
     final = np.zeros(arm.n)
     final[-2] = 2.0
     request = MotionRequest(start=np.zeros(arm.n), final=final, duration=1.0)
-    result = plan(request, arm, PlanningOptions(strategy=strategy, drive=Drive.POSITION))
+    result = plan(
+        request,
+        arm,
+        PlanningOptions(strategy=strategy, drives=DriveSettings(drive=Drive.POSITION)),
+    )
     samples = result.sample(0.005)
     motors = arm.n - 1
     profile = EffortProfile(
@@ -50,7 +55,7 @@ def planned(arm, strategy=Strategy.INSENSITIVE):
 @pytest.mark.parametrize('arm', [ARM, ELBOW], ids=['2', '3'])
 def test_an_ideal_servo_is_where_it_should_be_and_leaves_nothing(arm):
     _, samples, profile = planned(arm)
-    motion = rollout(arm, profile, 1.5, drive=Drive.POSITION)
+    motion = rollout(arm, profile, 1.5, drives=DriveSettings(drive=Drive.POSITION))
     every = round((len(motion.times) - 1) / 1.5 * 0.005)
     reached = motion.positions[: 201 * every : every]
     assert reached[:, :-1] == pytest.approx(samples.positions[:, :-1], abs=1e-6)
@@ -63,7 +68,7 @@ def test_an_ideal_servo_is_where_it_should_be_and_leaves_nothing(arm):
 def test_another_arm_swings_as_predicted(arm, factors):
     result, _, profile = planned(arm, Strategy.MIN_POTENTIAL_ENERGY)
     other = arm.scaled(stiffness=factors[0], damping=factors[1])
-    motion = rollout(other, profile, 1.0, step=5e-4, drive=Drive.POSITION)
+    motion = rollout(other, profile, 1.0, step=5e-4, drives=DriveSettings(drive=Drive.POSITION))
     swung = envelope(other, motion.positions[-1, -1], motion.velocities[-1, -1], held=True)
     left = residual_of_plan(result)
     assert 1e-3 < swung <= left.worst * 1.001
@@ -73,7 +78,7 @@ def test_another_arm_swings_as_predicted(arm, factors):
 
 def test_a_servo_takes_the_effort_of_the_plan():
     _, samples, profile = planned(ARM)
-    simulated = SimulatedArm(ARM, drive=Drive.POSITION)
+    simulated = SimulatedArm(ARM, drives=DriveSettings(drive=Drive.POSITION))
     simulated.command(profile, 0.0)
     shown = []
     for time in samples.times:
@@ -87,7 +92,9 @@ def test_a_servo_takes_the_effort_of_the_plan():
 @pytest.mark.parametrize('bandwidth', [2.0, 20.0])
 def test_a_slow_servo_follows_as_a_critically_damped_oscillator(bandwidth):
     _, _, profile = planned(ARM)
-    motion = rollout(ARM, profile, 2.0, drive=Drive.POSITION, servo_bandwidth=bandwidth)
+    motion = rollout(
+        ARM, profile, 2.0, drives=DriveSettings(drive=Drive.POSITION, servo_bandwidth=bandwidth)
+    )
     own = 2.0 * np.pi * bandwidth
 
     def rates(t, state):
@@ -104,7 +111,7 @@ def test_a_slow_servo_follows_as_a_critically_damped_oscillator(bandwidth):
 
 
 def test_servos_hold_an_arm_that_is_told_nothing():
-    simulated = SimulatedArm(ARM, position=[0.3, 0.2], drive=Drive.POSITION)
+    simulated = SimulatedArm(ARM, position=[0.3, 0.2], drives=DriveSettings(drive=Drive.POSITION))
     simulated.advance(0.5)
     assert simulated.position[0] == pytest.approx(0.3, abs=1e-9)
     assert simulated.velocity[0] == pytest.approx(0.0, abs=1e-9)
@@ -116,7 +123,7 @@ def test_servos_hold_an_arm_that_is_told_nothing():
 
 def test_servos_take_positions_only():
     _, samples, profile = planned(ARM)
-    simulated = SimulatedArm(ARM, drive=Drive.POSITION)
+    simulated = SimulatedArm(ARM, drives=DriveSettings(drive=Drive.POSITION))
     efforts = EffortProfile(start=0.0, times=profile.times, efforts=profile.efforts)
     with pytest.raises(InvalidCommand, match='needs a command with positions'):
         simulated.command(efforts, 0.0)
@@ -127,8 +134,13 @@ def test_servos_take_positions_only():
 def test_a_bandwidth_needs_steps_that_resolve_it():
     with pytest.raises(InvalidModel, match='shorter steps'):
         SimulationSettings(
-            arm=ARM, position=(0.0, 0.0), drive=Drive.POSITION, servo_bandwidth=100.0
+            arm=ARM,
+            position=(0.0, 0.0),
+            drives=DriveSettings(drive=Drive.POSITION, servo_bandwidth=100.0),
         )
     SimulationSettings(
-        arm=ARM, position=(0.0, 0.0), step=1e-4, drive=Drive.POSITION, servo_bandwidth=100.0
+        arm=ARM,
+        position=(0.0, 0.0),
+        step=1e-4,
+        drives=DriveSettings(drive=Drive.POSITION, servo_bandwidth=100.0),
     )

@@ -20,6 +20,7 @@ from math import pi
 from core.conftest import envelope
 from flat_planner_ros.core.arm.errors import InvalidCommand, InvalidModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import rollout, SimulatedArm
 import numpy as np
@@ -441,7 +442,10 @@ def test_command_that_has_ended_is_refused_and_leaves_the_present_one():
 
 def test_saturation_clips_and_counts():
     profile = swing(1, peak=4e-3)
-    free, limited = SimulatedArm(PAPER), SimulatedArm(PAPER, saturation=[2e-3])
+    free, limited = (
+        SimulatedArm(PAPER),
+        SimulatedArm(PAPER, drives=DriveSettings(saturation=(2e-3,))),
+    )
     for simulated in (free, limited):
         simulated.command(profile, 0.0)
         simulated.advance(0.25)
@@ -488,13 +492,13 @@ def test_without_gains_nothing_brings_a_displaced_arm_back():
 
 
 def test_feedback_without_a_reference_is_refused():
-    simulated = SimulatedArm(PAPER, feedback_p=[0.02])
+    simulated = SimulatedArm(PAPER, drives=DriveSettings(feedback_p=(0.02,)))
     with pytest.raises(InvalidCommand, match='positions'):
         simulated.command(swing(1), 0.0)
 
 
 def test_reset_rests_the_arm_and_forgets_the_command_but_not_the_time():
-    simulated = SimulatedArm(PAPER, feedback_p=[0.02])
+    simulated = SimulatedArm(PAPER, drives=DriveSettings(feedback_p=(0.02,)))
     still = {'positions': np.zeros((201, 1)), 'velocities': np.zeros((201, 1))}
     simulated.command(swing(1, **still), 0.0)
     simulated.advance(0.5)

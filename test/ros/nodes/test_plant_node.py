@@ -20,7 +20,7 @@ import signal
 from time import monotonic
 
 from flat_planner_ros.core import EffortProfile, FlatPlannerError, PlanarArm
-from flat_planner_ros.core.plant import PacedArm, rollout
+from flat_planner_ros.core.plant import DriveSettings, PacedArm, rollout
 from flat_planner_ros.ros.nodes.plant_node import CLOCK_START, PlantNode
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.wire import conversions, stamps
@@ -408,7 +408,9 @@ def test_saturation_clips_and_is_told_with_counts(graph):
     plant = Plant(graph, {**QUICK, 'torque.saturation': [PEAK / 2]})
     start = plant.ahead()
     plant.play(start)
-    expected = expected_motion(PAPER, start, plant.times, saturation=[PEAK / 2])
+    expected = expected_motion(
+        PAPER, start, plant.times, drives=DriveSettings(saturation=(PEAK / 2,))
+    )
     assert np.abs(plant.table('position') - expected).max() < 1e-9
     assert np.abs(plant.table('effort')[:, 0]).max() == PEAK / 2
     counts = [int(text.split()[-2]) for text in plant.logged('effort clipped')]
