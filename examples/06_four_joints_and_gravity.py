@@ -24,6 +24,7 @@ from pathlib import Path
 import sys
 
 from flat_planner_ros.core import (
+    DriveSettings,
     EffortProfile,
     JointLimits,
     MotionRequest,
@@ -34,7 +35,6 @@ from flat_planner_ros.core import (
     shortest_plan,
     Strategy,
 )
-from flat_planner_ros.core.plant import DriveSettings
 from matplotlib import pyplot as plt
 import numpy as np
 

@@ -26,6 +26,7 @@ import sys
 
 from flat_planner_ros.core import (
     Drive,
+    DriveSettings,
     EffortProfile,
     MotionRequest,
     plan,
@@ -35,7 +36,6 @@ from flat_planner_ros.core import (
     rollout,
     Strategy,
 )
-from flat_planner_ros.core.plant import DriveSettings
 from matplotlib import pyplot as plt
 import numpy as np
 

@@ -37,7 +37,7 @@ from flat_planner_ros.core.planning import (
     ViaPoint,
     with_via_times,
 )
-from flat_planner_ros.core.plant import EffortProfile, rollout, SimulatedArm
+from flat_planner_ros.core.plant import DriveSettings, EffortProfile, rollout
 from flat_planner_ros.core.session import (
     Goal,
     GoalPoint,
@@ -49,6 +49,7 @@ from flat_planner_ros.core.session import (
 __all__ = [
     'counterbalances',
     'Drive',
+    'DriveSettings',
     'EffortProfile',
     'fit_oscillation',
     'FlatModel',
@@ -70,9 +71,8 @@ __all__ = [
     'suggest_counterbalances',
     'rollout',
     'SessionSettings',
-    'shortest_plan',
-    'SimulatedArm',
     'StartSource',
+    'shortest_plan',
     'Strategy',
     'UncertaintyBox',
     'ViaPoint',

@@ -22,6 +22,7 @@ from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import SimulatedArm
 import numpy as np
@@ -161,10 +162,10 @@ def test_a_servo_of_finite_stiffness_is_documented(motion, bandwidth):
     """Critically damped PD on joint 1 in the full simulation, without and with feed-forward."""
     samples = motion.sample(0.005)
     pole = 2 * np.pi * bandwidth
-    gains = {
-        'feedback_p': [ARM.inertia_star.both * pole**2],
-        'feedback_d': [2 * ARM.inertia_star.both * pole],
-    }
+    gains = DriveSettings(
+        feedback_p=(ARM.inertia_star.both * pole**2,),
+        feedback_d=(2 * ARM.inertia_star.both * pole,),
+    )
     measured = []
     for share in (0.0, 1.0):
         profile = EffortProfile(
@@ -174,7 +175,7 @@ def test_a_servo_of_finite_stiffness_is_documented(motion, bandwidth):
             positions=samples.positions[:, :-1],
             velocities=samples.velocities[:, :-1],
         )
-        simulated = SimulatedArm(ARM, step=5e-4, **gains)
+        simulated = SimulatedArm(ARM, step=5e-4, drives=gains)
         simulated.command(profile, 0.0)
         settled = DURATION + 3.0 / bandwidth
         simulated.advance(settled)

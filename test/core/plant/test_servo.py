@@ -38,7 +38,7 @@ def planned(arm, strategy=Strategy.INSENSITIVE):
     result = plan(
         request,
         arm,
-        PlanningOptions(strategy=strategy, drives=DriveSettings(drive=Drive.POSITION)),
+        PlanningOptions(strategy=strategy, drive=Drive.POSITION),
     )
     samples = result.sample(0.005)
     motors = arm.n - 1

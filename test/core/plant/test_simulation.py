@@ -464,8 +464,8 @@ def test_saturation_clips_and_counts():
 
 
 def test_feedback_adds_gains_times_errors():
-    gains = {'feedback_p': [0.02], 'feedback_d': [0.005]}
-    simulated = SimulatedArm(PAPER, position=[0.1, 0.0], step=5e-3, **gains)
+    gains = DriveSettings(feedback_p=(0.02,), feedback_d=(0.005,))
+    simulated = SimulatedArm(PAPER, position=[0.1, 0.0], step=5e-3, drives=gains)
     positions = np.array([[0.3], [0.5]])
     profile = EffortProfile(
         start=0.0,
@@ -548,10 +548,10 @@ def test_state_is_copied_out():
         ({'time': float('inf')}, 'time'),
         ({'position': [0.0]}, 'position'),
         ({'position': [0.0, float('nan')]}, 'position'),
-        ({'saturation': [-1.0]}, 'saturation'),
-        ({'saturation': [1.0, 1.0]}, 'saturation'),
-        ({'feedback_p': [float('nan')]}, 'feedback_p'),
-        ({'feedback_d': [-1.0]}, 'feedback_d'),
+        ({'drives': DriveSettings(saturation=(-1.0,))}, 'saturation'),
+        ({'drives': DriveSettings(saturation=(1.0, 1.0))}, 'saturation'),
+        ({'drives': DriveSettings(feedback_p=(float('nan'),))}, 'feedback_p'),
+        ({'drives': DriveSettings(feedback_d=(-1.0,))}, 'feedback_d'),
     ],
 )
 def test_options_without_meaning_are_refused(change, message):

@@ -35,7 +35,7 @@ from math import ceil, pi
 from core.conftest import ARM
 from flat_planner_ros.core.arm import JointSample, PlanarArm
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, Strategy
-from flat_planner_ros.core.plant import SimulatedArm
+from flat_planner_ros.core.plant import DriveSettings, SimulatedArm
 from flat_planner_ros.core.tracking import TrackedMotion, Tracker
 import numpy as np
 
@@ -91,7 +91,10 @@ class ClosedLoop:
         """Stand still at time zero."""
         step = self.period / ceil(self.period / PLANT_STEP - 1e-9)
         self.arm = SimulatedArm(
-            self.true, step=step, position=self.position, saturation=self.saturation
+            self.true,
+            step=step,
+            position=self.position,
+            drives=DriveSettings(saturation=self.saturation),
         )
         self.random = np.random.default_rng(1)
         self.acting = np.zeros(self.true.n - 1)
