@@ -23,16 +23,26 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log10, tau
 
-from flat_planner_ros.core.arm import Drive, FloatArray, OutOfReach, PlanarArm
+from flat_planner_ros.core.arm import Drive, FloatArray, InvalidRequest, OutOfReach, PlanarArm
 from flat_planner_ros.core.insensitive.insensitivity import (
     DEFAULT_WEIGHT,
     Insensitivity,
     MAX_INSENSITIVITY,
     Nominal,
 )
-from flat_planner_ros.core.insensitive.momentum_angle import Course, least_effort, UNIT_COURSE
+from flat_planner_ros.core.insensitive.momentum_angle import (
+    Course,
+    least_effort,
+    NO_POINTS,
+    UNIT_COURSE,
+)
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
-from flat_planner_ros.core.insensitive.response import largest_miss, responses, SeriesLaw
+from flat_planner_ros.core.insensitive.response import (
+    flat_outputs,
+    largest_miss,
+    responses,
+    SeriesLaw,
+)
 from flat_planner_ros.core.insensitive.trade import Compromise, Trade
 import numpy as np
 
@@ -53,6 +63,9 @@ MARGIN = 1e-3
 
 REFRESHED = 0.05
 """Share of all weights that is spread evenly again between two steps of a search [-]."""
+
+MAX_VIA_POINTS = 16
+"""Most points of one motion; polynomials through more lose the promised accuracy."""
 
 MOTIONS_KEPT = 64
 """Solved problems that are remembered."""
@@ -144,9 +157,12 @@ def insensitive_motion_from(
     start: FloatArray,
     final: float,
     drive: Drive = Drive.EFFORT,
+    *,
+    times: FloatArray = NO_POINTS,
+    values: FloatArray = NO_POINTS,
 ) -> InsensitiveMotion:
     """
-    Return the insensitive motion from a start in motion to rest.
+    Return the insensitive motion from a start at rest or in motion, through points, to rest.
 
     Parameters
     ----------
@@ -156,6 +172,8 @@ def insensitive_motion_from(
         Derivatives 0 to 5 of the planned variable, shape (6,) [rad/s^k].
     final
         Where it comes to rest [rad].
+    times, values
+        Of via points on the way: from the start, and of the flat output y1, shape (v,) [s], [rad].
 
     Raises
     ------
@@ -163,10 +181,16 @@ def insensitive_motion_from(
         As by `insensitive_motion`.
 
     """
+    if len(times) > MAX_VIA_POINTS:
+        raise InvalidRequest(
+            f'strategy insensitive has up to {MAX_VIA_POINTS} via points, got {len(times)}: use '
+            f'another strategy, or several goals'
+        )
     # Counted from the end, so that a distant place costs no digits of a short way.
     way = start * (0.5 * duration) ** np.arange(len(start))
     way[0] -= final
-    found = _of_course(arm, duration, wanted, 1.0, drive, Course(start=way, end=0.0))
+    course = Course(start=way, end=0.0, places=2.0 * times / duration - 1.0, values=values - final)
+    found = _of_course(arm, duration, wanted, 1.0, drive, course)
     return replace(found, law=found.law.transformed(1.0, final))
 
 
@@ -240,12 +264,13 @@ def _motion(problem: Trade, found: Compromise) -> InsensitiveMotion:
     fourth = basis.start + basis.directions @ found.c
     (law,) = responses(fourth[:, None], second[:, None], equation, problem.duration, course.start)
     is_exact = problem.wanted.nominal is Nominal.EXACT
+    miss = largest_miss(law, second, equation, course.start, course.end, rests_at_end=is_exact)
+    passed = np.append(flat_outputs(law, equation, course.places) - course.values, 0.0)
+    size = np.abs(np.append(course.values, course.start[0])).max()
     return InsensitiveMotion(
         law=law,
         cost=found.cost,
-        boundary_residual=largest_miss(
-            law, second, equation, course.start, course.end, rests_at_end=is_exact
-        ),
+        boundary_residual=max(miss, float(np.abs(passed).max() / (size or 1.0))),
         optimality_residual=found.stationarity,
     )
 

@@ -155,10 +155,14 @@ def _orthonormal(fourths: FloatArray, seconds: FloatArray, efforts: FloatArray) 
     )
 
 
+NO_POINTS = locked(np.zeros(0))
+"""Of a course without via points."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Course:
     """
-    Where a motion begins and ends, derivatives by x from -1 to 1.
+    Where a motion begins, passes and ends, derivatives by x from -1 to 1.
 
     Attributes
     ----------
@@ -166,14 +170,23 @@ class Course:
         Derivatives 0 to 5 of the planned variable at the start, shape (6,) [rad].
     end
         Where it comes to rest [rad].
+    places, values
+        Of via points on the way, x and the flat output y1, shape (v,) [-], [rad].
 
     """
 
     start: FloatArray
     end: float
+    places: FloatArray
+    values: FloatArray
 
 
-UNIT_COURSE = Course(start=locked(np.array([-0.5, 0.0, 0.0, 0.0, 0.0, 0.0])), end=0.5)
+UNIT_COURSE = Course(
+    start=locked(np.array([-0.5, 0.0, 0.0, 0.0, 0.0, 0.0])),
+    end=0.5,
+    places=NO_POINTS,
+    values=NO_POINTS,
+)
 """From rest to rest over 1 rad."""
 
 

@@ -227,6 +227,13 @@ def _split(
     return SeriesLaw(duration=duration, table=table, rate=complex(rate), amplitude=amplitude)
 
 
+def flat_outputs(law: SeriesLaw, equation: Normalised, places: FloatArray) -> FloatArray:
+    """Return y1 = w + delta w' of a law at some x, shape (m,) [rad]."""
+    value, slope = law.normalised_jet(np.array([1.0 + places, 1.0 - places]), 1)
+    result: FloatArray = value + equation.delta * slope
+    return result
+
+
 @cache
 def _ends_of_series() -> FloatArray:
     """Return derivatives 0 to 3 of eight Legendre polynomials at -1, then at 1, shape (8, 8)."""

@@ -37,7 +37,7 @@ from flat_planner_ros.core.insensitive.momentum_angle import (
 )
 from flat_planner_ros.core.insensitive.oscillator import largest, Oscillator
 from flat_planner_ros.core.insensitive.residual import legendre_residuals, swing_of_start
-from flat_planner_ros.core.insensitive.response import Normalised
+from flat_planner_ros.core.insensitive.response import flat_outputs, Normalised, responses
 import numpy as np
 
 GAP = 5e-3
@@ -45,6 +45,9 @@ GAP = 5e-3
 
 MAX_ROUNDS = 150
 """Reweightings after which the law is taken with the gap that it has."""
+
+MODES_PER_POINT = 8
+"""Coefficients more for each via point: a half-wave is as well resolved as a whole motion is."""
 
 MAX_POINTS = 65
 """Most points of an edge that are weighed; those of the prediction may be more."""
@@ -91,22 +94,29 @@ class Trade:
         wanted: Insensitivity,
         course: Course = UNIT_COURSE,
     ) -> 'Trade':
-        """Return the problem, what is left on the nominal arm settled."""
+        """Return the problem, what is left on the nominal arm and via points settled."""
         equation = Normalised.of(oscillator, duration)
+        modes = wanted.modes + MODES_PER_POINT * len(course.places)
         problem = cls(
             oscillator=oscillator,
             equation=equation,
             duration=duration,
             wanted=wanted,
             course=course,
-            basis=basis_for(oscillator, equation, wanted.modes, course),
+            basis=basis_for(oscillator, equation, modes, course),
         )
-        if wanted.nominal is Nominal.FREE:
+        conditions = []
+        if wanted.nominal is Nominal.EXACT:
+            conditions.append(problem.residuals(np.ones((1, 3))))
+        if len(course.places):
+            conditions.append(problem.misses())
+        if not conditions:
             return problem
-        matrix, start = problem.residuals(np.ones((1, 3)))
+        matrix, start = (np.concatenate(parts) for parts in zip(*conditions, strict=True))
         left, sizes, right = np.linalg.svd(matrix)
-        origin = right[:2].T @ (-(left.T @ start) / sizes)
-        return replace(problem, basis=problem.basis.changed(origin, right[2:].T))
+        count = len(sizes)
+        origin = right[:count].T @ (-(left.T @ start) / sizes)
+        return replace(problem, basis=problem.basis.changed(origin, right[count:].T))
 
     @cached_property
     def points(self) -> tuple[FloatArray, FloatArray]:
@@ -159,6 +169,21 @@ class Trade:
         swing = swing_of_start(self.oscillator, factors, self.duration, self.course.start)
         start = stacked @ basis.second_start - np.concatenate([swing.real, swing.imag])
         return stacked @ basis.second_directions, start
+
+    def misses(self) -> tuple[FloatArray, FloatArray]:
+        """Return how far via points are missed as matrix @ c + start, shapes (v, modes), (v,)."""
+        basis, course, equation = self.basis, self.course, self.equation
+        still = np.zeros_like(course.start)
+        parts = [
+            (basis.start[:, None], basis.second_start[:, None], course.start),
+            (basis.directions, basis.second_directions, still),
+        ]
+        columns = [
+            flat_outputs(law, equation, course.places)
+            for fourths, seconds, begin in parts
+            for law in responses(fourths, seconds, equation, self.duration, begin)
+        ]
+        return np.array(columns[1:]).T, columns[0] - course.values
 
     def solve(self, weight: float, shares: FloatArray | None = None) -> Compromise:
         """Return the best coefficients for a weight; the shares are a first guess."""

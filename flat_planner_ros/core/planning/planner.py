@@ -83,10 +83,11 @@ def plan(request: MotionRequest, arm: PlanarArm, options: PlanningOptions) -> Pl
     _check_fit(request, arm)
     try:
         problem = problem_of(arm, options, request.duration)
+        if request.start_jets is not None:
+            options = _options_in_motion(options)
         if request.via:
             found = _through_points(request, options, problem)
         elif request.start_jets is not None:
-            options = _options_in_motion(options)
             found = _from_motion(request, options, problem, request.start_jets)
         else:
             found = _from_rest(request, options, problem)
@@ -239,19 +240,43 @@ def _through_points(
     request: MotionRequest, options: PlanningOptions, problem: MotionProblem
 ) -> _Certified:
     """Return the trajectory whose flat outputs pass given values on the way."""
-    if options.strategy in OWN_LAWS:
-        name = options.strategy.value
-        raise InvalidRequest(f'strategy {name} has no via points; another strategy has')
+    own = OWN_LAWS.get(options.strategy)
     path = path_of(request, problem)
-    found = optimal_path(problem.cost, path)
+    count = 0 if own is None else 1
+    laws: list[Law] = []
+    residuals, cost = [(0.0, 0.0)], None
+    if own is not None:
+        if own.through is None:
+            name = options.strategy.value
+            raise InvalidRequest(f'strategy {name} has no via points; another strategy has')
+        motion = own.through(problem.arm, options, _part(path, slice(0, 1)))
+        laws.append(motion.law)
+        residuals.append((motion.boundary_residual, motion.optimality_residual))
+        cost = motion.cost
+    if len(path.values) > count:
+        found = optimal_path(problem.cost, _part(path, slice(count, None)))
+        laws += found.laws
+        residuals.append((found.boundary_residual, found.optimality_residual))
+    boundary, optimality = np.max(residuals, axis=0).tolist()
     trajectory = LawTrajectory(
         problem=problem,
-        laws=found.laws,
+        laws=tuple(laws),
         start=path.start,
         final=path.values[:, -1],
         edges=tuple(path.edges.tolist()),
+        own_cost=cost,
     )
-    return _Certified(trajectory, found.boundary_residual, found.optimality_residual)
+    return _Certified(trajectory, boundary, optimality)
+
+
+def _part(path: PathConditions, variables: slice) -> PathConditions:
+    """Return the path of some variables."""
+    return PathConditions(
+        edges=path.edges,
+        start=path.start[variables],
+        values=path.values[variables],
+        relaxations=path.relaxations[variables],
+    )
 
 
 def path_of(request: MotionRequest, problem: MotionProblem) -> PathConditions:

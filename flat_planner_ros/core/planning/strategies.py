@@ -45,7 +45,7 @@ from flat_planner_ros.core.insensitive import (
     insensitive_motion_from,
     InsensitiveMotion,
 )
-from flat_planner_ros.core.motion_law import Law, Strategy, strategy_cost
+from flat_planner_ros.core.motion_law import Law, PathConditions, Strategy, strategy_cost
 from flat_planner_ros.core.peak import (
     check_peak,
     peak_motion,
@@ -104,6 +104,9 @@ class OwnLaw:
     motion_from
         From the arm, the options, the duration [s], the derivatives 0 to 5 of the first planned
         variable at the start [rad/s^k] and its value at the end [rad] to the motion.
+    through
+        From the arm, the options and the path of the first planned variable to the motion through
+        its points; None where there is none.
     stand_in
         Strategy of the same cost, which stands in where the law cannot: where the motion that it
         continues is of another flat map, and in a stop without `stop`.
@@ -123,6 +126,7 @@ class OwnLaw:
     motion: Callable[[PlanarArm, PlanningOptions, float, float], OwnMotion]
     check: Callable[[PlanarArm, PlanningOptions], None]
     motion_from: Callable[[PlanarArm, PlanningOptions, float, FloatArray, float], OwnMotion]
+    through: Callable[[PlanarArm, PlanningOptions, PathConditions], OwnMotion] | None = None
     stand_in: Strategy = Strategy.POLYNOMIAL
     stop: Callable[[PlanarArm, PlanningOptions, float, FloatArray], float] | None = None
     shortest: Callable[[PlanarArm, PlanningOptions, float, float], float] | None = None
@@ -146,6 +150,24 @@ def _insensitive_from(
     """Return the same from a start in motion."""
     found = insensitive_motion_from(
         arm, duration, options.insensitivity, start, final, options.drive
+    )
+    return _of_insensitive(found)
+
+
+def _insensitive_through(
+    arm: PlanarArm, options: PlanningOptions, path: PathConditions
+) -> OwnMotion:
+    """Return the same through the points of a path of one variable."""
+    _check_flat_model(options)
+    found = insensitive_motion_from(
+        arm,
+        float(path.edges[-1]),
+        options.insensitivity,
+        path.start[0],
+        float(path.values[0, -1]),
+        options.drive,
+        times=path.edges[1:-1],
+        values=path.values[0, :-1],
     )
     return _of_insensitive(found)
 
@@ -231,7 +253,10 @@ def _shortest_least_peak_from(
 OWN_LAWS: Mapping[Strategy, OwnLaw] = MappingProxyType(
     {
         Strategy.INSENSITIVE: OwnLaw(
-            motion=_insensitive, check=_check_insensitive, motion_from=_insensitive_from
+            motion=_insensitive,
+            check=_check_insensitive,
+            motion_from=_insensitive_from,
+            through=_insensitive_through,
         ),
         Strategy.MIN_PEAK_EFFORT: OwnLaw(
             motion=_least_peak,

@@ -179,9 +179,9 @@ def test_points_too_close_in_time_are_refused(arm):
         replace(REQUEST, via=(REQUEST.via[1], REQUEST.via[0]))
 
 
-def test_insensitive_motions_have_no_via_points(arm):
-    with pytest.raises(InvalidRequest, match='insensitive'):
-        plan(REQUEST, arm, PlanningOptions(strategy=Strategy.INSENSITIVE))
+def test_motions_of_least_peak_have_no_via_points(arm):
+    with pytest.raises(InvalidRequest, match='min_peak_effort'):
+        plan(REQUEST, arm, PlanningOptions(strategy=Strategy.MIN_PEAK_EFFORT))
 
 
 def test_fifty_points(arm):

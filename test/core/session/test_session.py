@@ -146,11 +146,11 @@ def test_via_points_beyond_the_position_limits_are_refused():
     assert 'via point 0' in str(error)
 
 
-def test_the_insensitive_strategy_refuses_via_points():
-    options = PlanningOptions(strategy=Strategy.INSENSITIVE)
+def test_the_strategy_of_least_peak_refuses_via_points():
+    options = PlanningOptions(strategy=Strategy.MIN_PEAK_EFFORT)
     error = reason_of(session(options=options).submit, VIA, NOW)
     assert error.reason is Reason.INVALID_GOAL
-    assert 'insensitive' in str(error)
+    assert 'min_peak_effort' in str(error)
 
 
 def test_a_start_in_motion_is_insensitive_and_a_stop_is_the_cheapest():
