@@ -64,7 +64,7 @@ def test_passes_the_points_and_leaves_what_is_predicted(arm, drive, times, nomin
     samples = planned.sample(2.0 / 8000.0)
     is_pushed = drive is Drive.EFFORT
     signal = samples.driving_effort if is_pushed else samples.driving_velocity
-    left = residual_of_plan(planned)
+    left = residual_of_plan(planned, samples)
     for place, predicted in (
         ((1.0, 1.0, 1.0), left.nominal),
         ((left.stiffness_factor, left.damping_factor, left.inertia_factor), left.worst),
