@@ -34,10 +34,12 @@ from flat_planner_ros.ros.live_view.page_settings import (
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.verdict_text import list_text
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.serialization import deserialize_message
+from rclpy.task import Future as RosFuture
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -60,6 +62,17 @@ BACKWARD = 0.5
 
 VERDICTS = 20
 """Verdicts that are kept [-]."""
+
+ANSWERS = ('ACCEPTED', 'REJECTED')
+"""States of verdicts on goals."""
+
+PREDICTIONS = (
+    'predicted_residual',
+    'predicted_residual_worst',
+    'predicted_residual_box',
+    'advice',
+)
+"""What of a verdict's values the page shows."""
 
 TEXT_LIMIT = 500
 """Longest text of a message that is shown [characters]."""
@@ -109,6 +122,7 @@ class LiveNode(GuardedNode):
         self._last = dict.fromkeys(STREAMS, 0.0)
         self._verdicts: deque[dict[str, Any]] = deque(maxlen=VERDICTS)
         self._asked: dict[str, float] = {}
+        self._sent: deque[tuple[str, RosFuture]] = deque(maxlen=VERDICTS)
         self._listen()
         self._goals = self.create_publisher(
             JointTrajectory,
@@ -148,7 +162,9 @@ class LiveNode(GuardedNode):
         try:
             return await asyncio.wait_for(asyncio.wrap_future(answer), PATIENCE)
         except asyncio.TimeoutError:  # noqa: UP041  Another class on Python 3.10.
-            return False, f'no answer within {PATIENCE:g} s'
+            is_goal = isinstance(command, Mapping) and command.get('do') == 'goal'
+            # A goal may wait for the first joint state; its verdict comes in the list.
+            return is_goal, f'{"sent, but " if is_goal else ""}no answer within {PATIENCE:g} s'
 
     def _listen(self) -> None:
         """Subscribe to all that the page shows."""
@@ -225,15 +241,32 @@ class LiveNode(GuardedNode):
     def _on_status(self, msg: DiagnosticArray) -> None:
         """Tell a verdict."""
         for status in msg.status:
+            values = _values(status)
             self._verdicts.appendleft(
                 {
                     'time': stamps.seconds(msg.header.stamp),
                     'level': LEVELS.get(status.level, 'stale'),
-                    'state': _values(status).get('state', ''),
+                    'state': values.get('state', ''),
                     'text': status.message[:TEXT_LIMIT],
+                    'values': {key: values[key] for key in PREDICTIONS if key in values},
                 }
             )
+            self._answer_goals(values, status.message)
         self.feed.put('verdicts', list(self._verdicts))
+
+    def _answer_goals(self, values: Mapping[str, str], message: str) -> None:
+        """Tell the browser whose goal a verdict is on, the first of those who sent the same."""
+        state, positions = values.get('state'), values.get('goal.positions')
+        if state not in ANSWERS:
+            return
+        for sent in self._sent:
+            if sent[0] == positions:
+                self._sent.remove(sent)
+                is_accepted = state == ANSWERS[0]
+                sent[1].set_result(
+                    (is_accepted, message if is_accepted else f'rejected: {message}')
+                )
+                return
 
     def _on_report(self, msg: DiagnosticArray) -> None:
         """Tell what a motion has left."""
@@ -300,15 +333,15 @@ class LiveNode(GuardedNode):
             raise InvalidRequest('a command is an object')
         deed = command.get('do')
         if deed == 'goal':
-            return self._send_goal(command.get('positions'), command.get('duration'))
+            return await self._send_goal(command.get('positions'), command.get('duration'))
         if deed == 'set':
             return await self._set(command.get('node'), command.get('values'))
         if deed == 'call':
             return await self._call(command.get('service'))
         raise InvalidRequest(f'unknown command {str(deed)[:TEXT_LIMIT]!r}')
 
-    def _send_goal(self, positions: Any, duration: Any) -> tuple[bool, str]:
-        """Publish a goal for the actuated joints."""
+    async def _send_goal(self, positions: Any, duration: Any) -> tuple[bool, str]:
+        """Publish a goal for the actuated joints; return its verdict."""
         joints = self._joints[:-1]
         if not joints:
             raise InvalidRequest('the joints are not known yet: no joint states, no plan')
@@ -324,8 +357,11 @@ class LiveNode(GuardedNode):
             ],
             time_from_start=time,
         )
+        verdict: RosFuture = RosFuture()
+        self._sent.append((list_text(point.positions), verdict))
         self._goals.publish(JointTrajectory(joint_names=joints, points=[point]))
-        return True, 'goal sent'
+        answer: tuple[bool, str] = await verdict
+        return answer
 
     async def _set(self, node: Any, values: Any) -> tuple[bool, str]:
         """Set parameters of a node, one after the other."""

@@ -45,6 +45,7 @@ PAGES = {
     '/live.css': ('live.css', 'text/css'),
     '/live.js': ('live.js', 'text/javascript'),
     '/plots.js': ('plots.js', 'text/javascript'),
+    '/words.js': ('words.js', 'text/javascript'),
 }
 
 HEADERS = {

@@ -120,7 +120,7 @@ def accepted_status(
     message = (
         f'plan {motion.plan_id}: {plan.options.strategy.value}, {plan.request.duration:g} s, '
         f'peak effort {peaks[strongest]:.4g} N m of {joints[strongest]}, '
-        f'starts at {motion.start:.3f} s'
+        f'starts at {motion.start:.3f} s, in {motion.start - motion.planned_at:.3f} s'
     )
     values: dict[str, float | int | str | None] = {
         **_motion_values(motion, 'ACCEPTED'),

@@ -1,11 +1,13 @@
 // The page: hears the server's news over a websocket, draws them, and sends commands back.
 
 import {drawArm, place, Plot, TRAIL} from './plots.js';
+import {angle, clock, inDegrees, number as numberIn, precise, readable} from './words.js';
 
 const PATIENCE = {shortest: 500, longest: 5000};  // [ms] between two tries to connect
 const HISTORY = 3000;                             // rows that are kept of a stream
 const STALE = 2000;                               // [ms] without a joint state
 const MILLI = 1000;
+const AGE = 1e-3;                                 // [s] from which a motion is another one
 
 const $ = id => document.getElementById(id);
 const state = {streams: {}, values: {}, paused: null, cursor: null, heard: 0, latest: 0};
@@ -72,6 +74,7 @@ const show = {
     for (const button of document.querySelectorAll('[data-service]')) {
       button.disabled = !nodes[needs[button.dataset.service]];
     }
+    tellReportAge();
   },
   joints(joints) {
     const actuated = joints.slice(0, -1);
@@ -85,13 +88,14 @@ const show = {
       const item = element('li');
       const name = element('b', state.toLowerCase() || level);
       name.className = level;
-      item.append(element('time', clock(time)), name, element('span', text));
+      item.append(element('time', clock(time)), name, element('span', readable(text)));
       return item;
     }));
+    predict(verdicts.find(verdict => verdict.state === 'ACCEPTED'));
   },
+  plan() { tellReportAge(); },
   report({level, text, values}) {
-    const pill = $('report-level');
-    [pill.textContent, pill.className, pill.title] = [level, `pill ${level}`, text];
+    tellReportAge();
     $('amplitude').textContent = values.amplitude === undefined ? '?' : precise(MILLI * values.amplitude, 3);
     const rows = [
       ['frequency', values.frequency, 'Hz', values.frequency_expected],
@@ -114,63 +118,99 @@ const show = {
   'settings of flat_plant'(values) { fill('flat_plant', values); },
 };
 
+// What the last accepted motion is predicted to leave, beside the button that asked for it.
+function predict(verdict) {
+  const {predicted_residual: nominal, predicted_residual_worst: worst, predicted_residual_box: box, advice} = verdict?.values ?? {};
+  const told = [];
+  if (nominal !== undefined) told.push(`leaves ${precise(MILLI * nominal, 2)} mrad on the arm as modelled`);
+  if (worst !== undefined) told.push(`up to ${precise(MILLI * worst, 2)} mrad with ${box}`.replaceAll('+-', '±'));
+  $('prediction').textContent = told.join(', ') + (advice ? `. ${advice}` : '');
+}
+
+// A report that is not on the last motion, or whose monitor is gone, is of no colour.
+function tellReportAge() {
+  const {report, plan, nodes} = state.values;
+  if (!report) return;
+  const is_old = plan && report.start !== null && plan.start - report.start > AGE;
+  const is_gone = nodes && !nodes.flat_monitor;
+  const remark = is_old ? ', of an earlier motion' : is_gone ? ', the monitor is gone' : '';
+  const pill = $('report-level');
+  [pill.textContent, pill.title] = [report.level + remark, report.text];
+  pill.className = `pill ${remark ? 'stale' : report.level}`;
+}
+
 function element(kind, text = '') {
   const made = document.createElement(kind);
   made.textContent = text;
   return made;
 }
 
-function precise(value, digits) {
-  const x = Number(value);
-  if (!Number.isFinite(x)) return '–';
-  const text = Math.abs(x) < 1e-3 && x !== 0 ? x.toExponential(digits - 2) : String(Number(x.toPrecision(digits)));
-  return text.replace(/-/g, '−');
-}
-
-function clock(time) {  // since 1970, or since a simulation has begun
-  return time > 1e9 ? new Date(MILLI * time).toLocaleTimeString([], {hour12: false}) : `${time.toFixed(1)} s`;
-}
-
 function goalField(name) {
-  const [label, input, presets] = [element('label', name), element('input'), element('div')];
-  Object.assign(input, {name, inputMode: 'decimal', value: '1.57', required: true});
+  const [label, input, degrees, presets] = ['label', 'input', 'small', 'div'].map(kind => element(kind));
+  label.append(name);
+  Object.assign(input, {name, autocomplete: 'off', placeholder: '…', title: 'an angle: 1.57, 90° or pi/2'});
+  degrees.className = 'degrees';
   const unit = element('span');
-  unit.append(input, ' rad');
+  unit.append(input, ' rad ', degrees);
   label.append(unit);
   presets.className = 'presets';
+  const show = () => { degrees.textContent = inDegrees(readAngle(input)); };
+  input.oninput = () => { input.dataset.touched = 'true'; show(); };
+  input.onshow = show;
   for (const [text, value] of [['−π', -Math.PI], ['−π/2', -Math.PI / 2], ['0', 0], ['π/2', Math.PI / 2], ['π', Math.PI]]) {
     const button = element('button', text);
     button.type = 'button';
-    button.onclick = () => { input.value = String(Number(value.toFixed(6))); };
+    button.onclick = () => { input.value = String(Number(value.toFixed(6))); input.oninput(); };
     presets.append(button);
   }
   return [label, presets];
 }
 
-// Return the number in a field, and mark the field if there is none.
-function read(input) {
-  const value = Number(input.value.trim().replace('−', '-').replace(',', '.'));
-  const is_number = input.value.trim() !== '' && Number.isFinite(value);
-  input.setCustomValidity(is_number ? '' : 'a number, please');
-  return is_number ? value : null;
+// Where the arm is seen for the first time, the goal starts from: nothing moves before somebody has typed.
+function fillGoal(angles) {
+  [...$('goal-joints').querySelectorAll('input')].forEach((input, k) => {
+    if (input.dataset.touched || input.value !== '' || !Number.isFinite(angles[k])) return;
+    input.value = String(Number(angles[k].toFixed(3)));
+    input.onshow();
+  });
 }
+
+// Return what a field states, and mark the field if that is nothing.
+function readField(input, meaning, remark) {
+  const value = meaning(input.value);
+  input.setCustomValidity(value === null ? remark : '');
+  return value;
+}
+const read = input => readField(input, numberIn, 'a number, please');
+const readAngle = input => readField(input, angle, 'an angle, please: 1.57, 90° or pi/2');
 
 async function answer(output, command) {
   output.className = 'answer';
   output.textContent = '…';
   const {ok, text} = await send(command);
   output.className = `answer ${ok ? 'ok' : 'error'}`;
-  output.textContent = text;
+  output.textContent = readable(text);
   return ok;
 }
 
 $('goal').onsubmit = event => {
   event.preventDefault();
-  const positions = [...$('goal-joints').querySelectorAll('input')].map(read);
+  const positions = [...$('goal-joints').querySelectorAll('input')].map(readAngle);
   const duration = read($('duration'));
-  if ([...positions, duration].includes(null)) return;
+  if ([...positions, duration].includes(null)) {
+    $('goal').reportValidity();
+    return;
+  }
+  $('prediction').textContent = '';
   answer($('goal-answer'), {do: 'goal', positions, duration});
 };
+// A mark goes with the next key: a form is never blocked by what it once was.
+$('duration').oninput = event => read(event.target);
+document.addEventListener('keydown', event => {
+  if (event.key !== 'Escape' || event.repeat || $('stop').disabled) return;
+  event.preventDefault();
+  $('stop').click();
+});
 for (const button of document.querySelectorAll('[data-service]')) {
   const output = button.dataset.service === 'adopt' ? $('adopt-answer') : $('goal-answer');
   button.onclick = () => answer(output, {do: 'call', service: button.dataset.service});
@@ -198,8 +238,10 @@ function build(form, choices) {
   [buttons.className, output.className] = ['buttons', 'answer'];
   buttons.append(apply, undo);
   form.replaceChildren(fields, buttons, output);
+  form.noValidate = true;
   form.onsubmit = async event => {
     event.preventDefault();
+    if (!form.reportValidity()) return;
     const values = changes(form);
     const is_done = await answer(output, {do: 'set', node: form.dataset.node, values});
     if (is_done) for (const input of inputs(form)) if (input.name in values) input.dataset.known = shown(input);
@@ -237,7 +279,13 @@ function fill(node, values, everything = false) {
   for (const input of inputs(form)) {
     const is_untouched = input.dataset.known === undefined || shown(input) === input.dataset.known;
     input.disabled = !values;
-    if (!values) continue;
+    if (!values) {
+      // A value that nobody states is not shown, not even the first of a list.
+      if (input.type === 'checkbox') input.checked = false; else input.value = '';
+      if (input.tagName === 'SELECT') input.selectedIndex = -1;
+      delete input.dataset.known;
+      continue;
+    }
     const value = values[input.name];
     const text = typeof value === 'number' ? String(Number(value.toPrecision(9))) : String(value);
     input.dataset.known = text;
@@ -302,17 +350,19 @@ function frame() {
   const [m, r, e] = [at(measured), at(reference), at(residual)];
   const actuated = joints.slice(0, -1);
 
+  if (m.length) fillGoal(m.slice(1, n));
+
   state.box = plots.q.draw({...view, lines: [
+    ...joints.map((_, k) => ({rows: reference, column: 1 + k, colour: `--s${k % 6}`, planned: true})),
     ...joints.map((_, k) => ({rows: measured, column: 1 + k, colour: `--s${k % 6}`})),
-    ...joints.map((_, k) => ({rows: reference, column: 1 + k, colour: '--text', dashed: true})),
   ]}).box;
   plots.tau.draw({...view, lines: [
+    ...actuated.map((_, k) => ({rows: reference, column: 1 + 2 * n + k, colour: `--s${k % 6}`, planned: true})),
     ...actuated.map((_, k) => ({rows: measured, column: 1 + 2 * n + k, colour: `--s${k % 6}`})),
-    ...actuated.map((_, k) => ({rows: reference, column: 1 + 2 * n + k, colour: '--text', dashed: true})),
   ]});
   plots.residual.draw({...view, envelopes: envelopes(), lines: joints.map((_, k) =>
     ({rows: residual, column: 1 + k, factor: MILLI, colour: `--s${k % 6}`}))});
-  legend('q-legend', joints.map((name, k) => [name, `s${k % 6}`, fixed(m[1 + k], 3)]));
+  legend('q-legend', joints.map((name, k) => [name, `s${k % 6}`, `${fixed(m[1 + k], 3)} = ${Number.isFinite(m[1 + k]) ? inDegrees(m[1 + k]) : '–'}`]));
   legend('tau-legend', actuated.map((name, k) => [name, `s${k % 6}`, fixed(m[1 + 2 * n + k], 5)]));
   legend('residual-legend', joints.map((name, k) => [name, `s${k % 6}`, fixed(e[1 + k] === null || e[1 + k] === undefined ? null : MILLI * e[1 + k], 2)]));
 

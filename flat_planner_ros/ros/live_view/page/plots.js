@@ -34,7 +34,7 @@ export function ticks(low, high, most) {
   return {found: [], decimals: 0};
 }
 
-// One plot. `lines` are {rows, column, factor, colour, dashed}.
+// One plot. `lines` are {rows, column, factor, colour, planned}.
 export class Plot {
   constructor(canvas, smallest) {
     this.canvas = canvas;
@@ -111,23 +111,26 @@ export class Plot {
       c.lineTo(box.x + box.w, Math.round(Y(v)) + 0.5);
       c.fillText(v.toFixed(vertical.decimals).replace('-', '−'), box.x - 6, Y(v));
     }
-    const horizontal = ticks(from, to, 6);
+    // Seconds before the right edge: what a clock counts since its own start means nothing to a person.
+    const horizontal = ticks(from - to, 0, 6);
     c.textAlign = 'center';
     c.textBaseline = 'top';
     for (const t of horizontal.found) {
-      c.moveTo(Math.round(X(t)) + 0.5, box.y);
-      c.lineTo(Math.round(X(t)) + 0.5, box.y + box.h);
-      if (X(t) > box.x + 10 && X(t) < box.x + box.w - 14) {
-        c.fillText(`${t.toFixed(horizontal.decimals).replace('-', '−')} s`, X(t), box.y + box.h + 4);
+      const x = X(to + t);
+      c.moveTo(Math.round(x) + 0.5, box.y);
+      c.lineTo(Math.round(x) + 0.5, box.y + box.h);
+      if (x > box.x + 10 && x < box.x + box.w - 14) {
+        c.fillText(`${t.toFixed(horizontal.decimals).replace('-', '−')} s`, x, box.y + box.h + 4);
       }
     }
     c.stroke();
   }
 
-  line(c, {rows, column, factor = 1, colour: name, dashed}, X, Y) {
+  // What is planned is a wide, pale line: what is measured lies on it, and both are seen where they agree.
+  line(c, {rows, column, factor = 1, colour: name, planned}, X, Y) {
     c.strokeStyle = colour(name);
-    c.lineWidth = dashed ? 1.1 : 1.6;
-    c.setLineDash(dashed ? [5, 4] : []);
+    c.lineWidth = planned ? 6 : 1.6;
+    c.globalAlpha = planned ? 0.3 : 1;
     c.beginPath();
     let last = -Infinity;
     for (const row of rows) {
@@ -138,7 +141,7 @@ export class Plot {
       last = row[0];
     }
     c.stroke();
-    c.setLineDash([]);
+    c.globalAlpha = 1;
   }
 
   envelope(c, {start, until, at}, from, to, X, Y) {

@@ -41,11 +41,8 @@ export function clock(time) {
   return time > 1e9 ? new Date(1000 * time).toLocaleTimeString([], {hour12: false}) : `${time.toFixed(1)} s`;
 }
 
-// Return a sentence in which times since 1970 are times of the day, or times from when it was said.
-export function readable(text, said) {
-  return text.replace(/\bat (\d{10}\.\d+) s/g, (_, time) => {
-    const ahead = Number(time) - said;
-    return Math.abs(ahead) < 60 ? (ahead < 0 ? `${(-ahead).toFixed(2)} s ago` : `in ${ahead.toFixed(2)} s`)
-      : `at ${clock(Number(time))}`;
-  });
+// Return a sentence without times since 1970, where it also says when that is from now on.
+export function readable(text) {
+  return text.replace(/\bat \d+\.\d+ s, (in \d)/g, '$1')
+    .replace(/\bat (\d{10}\.\d+) s/g, (_, time) => `at ${clock(Number(time))}`);
 }
