@@ -18,10 +18,15 @@ from collections.abc import Iterator
 from math import pi
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.motion_law import Strategy
+from flat_planner_ros.core.planning import Plan, PlanSamples
 from flat_planner_ros.core.session.goal import Goal
 from flat_planner_ros.core.session.motion_start import MotionStart
 from flat_planner_ros.core.session.settings import SessionSettings
 import numpy as np
+
+STEEP = 1.0 / 3.0
+"""Share of its peak by which an effort may change within one sample [-]; the paper's: 1/6."""
 
 ROUNDING = 1e-9
 """Part of a turn that does not count as more than one [-]."""
@@ -66,6 +71,32 @@ def _remarks_on_start(settings: SessionSettings, goal: Goal, start: MotionStart)
                 f'its first point, at time 0, has {name} at {said:.4g} rad, but the motion starts '
                 f'at {true:.4g} rad (start.position_tolerance {tolerance:g} rad)'
             )
+
+
+def layer_remarks(settings: SessionSettings, found: Plan, samples: PlanSamples) -> Iterator[str]:
+    """
+    Return where a weight asks for a boundary layer that the command is too coarse to play.
+
+    Parameters
+    ----------
+    settings
+        With the spacing of samples.
+    found, samples
+        A plan, and what is sent of it.
+
+    """
+    # The strategy insensitive is steep by purpose, not by a weight.
+    if found.options.strategy is Strategy.INSENSITIVE:
+        return
+    efforts = samples.efforts[:, -2]  # joint n-1 alone carries the weights' layers
+    step = float(np.abs(np.diff(efforts)).max(initial=0.0))
+    peak = float(np.abs(efforts).max())
+    if step > STEEP * peak:
+        yield (
+            f'the effort of {settings.joints[-2]} changes by {100.0 * step / peak:.0f} % of its '
+            f'peak within one sample of {settings.period:g} s: lower weights, or a shorter '
+            f'sampling.period, are played more truly'
+        )
 
 
 def turns_remarks(settings: SessionSettings, goal: Goal, pose: FloatArray) -> Iterator[str]:

@@ -43,7 +43,7 @@ from flat_planner_ros.core.session.motion_start import (
     start_in_motion,
 )
 from flat_planner_ros.core.session.recent_states import RecentStates
-from flat_planner_ros.core.session.remarks import remarks_on, turns_remarks
+from flat_planner_ros.core.session.remarks import layer_remarks, remarks_on, turns_remarks
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 
@@ -176,12 +176,14 @@ class PlannerSession:
             turns = turns_remarks(settings, asked, start.pose)
             raise replace(error, message='; '.join([error.message, *turns])) from error
         is_gentle = duration is None and settings.duration_factor > 1.0
+        motion = self._motion_of(found, start, now)
+        layers = layer_remarks(settings, found, motion.samples)
         motion = replace(
-            self._motion_of(found, start, now),
+            motion,
             is_shortest=found.duration != duration and not is_gentle,
             duration_factor=settings.duration_factor if is_gentle else 1.0,
             exceeded=exceeded,
-            remarks=tuple(remarks_on(settings, asked, start, now)),
+            remarks=(*remarks_on(settings, asked, start, now), *layers),
         )
         motion = self._accepted(motion, start, goal.stamp, clock)
         self._last_goal = replace(goal.without_start, stamp=None)

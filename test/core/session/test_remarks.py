@@ -17,7 +17,8 @@
 from dataclasses import replace
 from math import inf, pi
 
-from core.session.test_session import GOAL, NOW, reason_of, session
+from core.session.test_session import GOAL, NOW, reason_of, session, SETTINGS
+from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.request import Reason
 from flat_planner_ros.core.session.goal import GoalPoint
@@ -108,3 +109,13 @@ def test_gentle_motions_take_a_multiple_of_the_shortest():
     assert gentle.plan.peak_effort[0] < 0.5 * shortest.plan.peak_effort[0]
     prescribed = session(limits=limits, duration_factor=2.0).submit(GOAL, NOW)
     assert prescribed.plan.duration == 1.0
+
+
+def test_a_weight_that_the_command_cannot_play_is_remarked():
+    options = SETTINGS.options
+    assert not session().submit(GOAL, NOW).remarks
+    (remark,) = session(options=replace(options, r=1000.0)).submit(GOAL, NOW).remarks
+    assert '100 % of its peak within one sample of 0.005 s' in remark
+    # Steep by purpose, and said elsewhere.
+    steep = replace(options, strategy=Strategy.INSENSITIVE)
+    assert not session(options=steep).submit(final(1.0, 0.5), NOW).remarks
