@@ -71,6 +71,8 @@ setup(
             'myst-parser>=3,<6',
             'numpydoc>=1.6,<2',
             'sphinx>=7.2,<9',
+            # Renders the formulas of the site without a network.
+            'sphinx-mathjax-offline',
         ],
         # ROS's linters, where ROS is not installed, with the plugins that it installs beside them.
         'lint': [

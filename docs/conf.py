@@ -14,6 +14,7 @@
 
 """Sphinx configuration: `make docs` builds the site into build/docs."""
 
+from importlib.util import find_spec
 from pathlib import Path
 import re
 import sys
@@ -49,3 +50,24 @@ html_title = f'flat_planner_ros {version}'
 html_copy_source = False
 exclude_patterns = ['_extensions']
 nitpicky = False
+
+# Formulas are rendered without a network where the package that ships the renderer is installed.
+if find_spec('sphinx-mathjax-offline') is not None:
+    extensions.append('sphinx-mathjax-offline')
+
+EXAMPLE = re.compile(r'^!\[[^]]*\]\(images/examples/(\w+)\.png\)$', re.MULTILINE)
+"""Picture of an example, below which the site shows its source; a code host has the link above."""
+
+
+def with_sources(_app, docname, source):
+    """Put the source of each example below its picture."""
+    if docname == 'examples':
+        below = (
+            r'\g<0>\n\n```{literalinclude} ../examples/\1.py\n:language: python\n:lines: 15-\n```'
+        )
+        source[0] = EXAMPLE.sub(below, source[0])
+
+
+def setup(app):
+    """Listen to the reading of pages."""
+    app.connect('source-read', with_sources)
