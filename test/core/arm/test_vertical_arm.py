@@ -20,6 +20,7 @@ from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import rollout
 import numpy as np
@@ -38,7 +39,7 @@ DURATION = 1.5
 PERIOD = 5e-3
 """Spacing of the command's points [s], as the planner node has it."""
 
-HELD = {'feedback_p': [50.0, 50.0, 0.0], 'feedback_d': [5.0, 5.0, 0.0]}
+HELD = DriveSettings(feedback_p=(50.0, 50.0, 0.0), feedback_d=(5.0, 5.0, 0.0))
 """Feedback on the joints that carry weight, none on joint n-1."""
 
 
@@ -74,7 +75,7 @@ def left(states):
 
 @pytest.mark.parametrize('strategy', [Strategy.POLYNOMIAL, Strategy.MIN_CONTROL_EFFORT])
 def test_a_motion_against_gravity_ends_at_rest(strategy):
-    states = played(arm_with(), strategy, **HELD)
+    states = played(arm_with(), strategy, drives=HELD)
     amplitude, deviation = left(states)
     assert amplitude < 1e-6
     assert (deviation < 1e-5).all()
@@ -89,17 +90,17 @@ def test_without_feedback_the_arm_falls_but_its_spring_does_not_notice():
 
 
 def test_feedback_at_joint_n_1_brings_the_others_errors_into_the_spring():
-    whole = {'feedback_p': [50.0, 50.0, 50.0], 'feedback_d': [5.0, 5.0, 5.0]}
-    amplitude, _ = left(played(arm_with(), **whole))
-    without, _ = left(played(arm_with(), **HELD))
+    whole = DriveSettings(feedback_p=(50.0, 50.0, 50.0), feedback_d=(5.0, 5.0, 5.0))
+    amplitude, _ = left(played(arm_with(), drives=whole))
+    without, _ = left(played(arm_with(), drives=HELD))
     assert amplitude > 100.0 * without
 
 
 def test_friction_is_compensated_and_a_motion_still_ends_at_rest():
     friction = {'viscous_friction': [0.2, 0.1, 2e-3], 'coulomb_friction': [0.3, 0.2, 3e-3]}
     arm = arm_with(**friction)
-    amplitude, deviation = left(played(arm, nominal=arm, **HELD))
-    unaware, _ = left(played(arm, **HELD))
+    amplitude, deviation = left(played(arm, nominal=arm, drives=HELD))
+    unaware, _ = left(played(arm, drives=HELD))
     assert amplitude < 1e-5 < 1e-4 < unaware
     # Coulomb friction has changed within a point of the command.
     assert (deviation < 2e-4).all()
@@ -112,6 +113,6 @@ def test_a_small_imbalance_leaves_a_small_residual(link):
     for size in (1e-6, 1e-5):
         imbalance = np.zeros(2)
         imbalance[link] = size
-        residuals.append(left(played(arm_with(imbalance), after=0.0, **HELD))[0])
+        residuals.append(left(played(arm_with(imbalance), after=0.0, drives=HELD))[0])
     assert residuals[1] == pytest.approx(10.0 * residuals[0], rel=0.05)
     assert 1e-5 < residuals[1] < 1e-2

@@ -26,6 +26,7 @@ from flat_planner_ros.core.monitor.identification import (
     StiffnessEstimate,
 )
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation
+from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import rollout
 import numpy as np
@@ -87,9 +88,9 @@ def pushed(plant, *, held: bool):
     pulse[-1] = 0.0
     reference = 0.05 * (1.0 - np.cos(np.pi * times / end))[:, None]
     profile = EffortProfile(start=0.0, times=times, efforts=pulse, positions=reference)
-    gains = {'feedback_p': [20.0], 'feedback_d': [0.3]} if held else {}
+    gains = DriveSettings(feedback_p=(20.0,), feedback_d=(0.3,)) if held else DriveSettings()
     step = 2.5e-4 if held else 1e-3
-    states = rollout(plant, profile, end + WINDOW, step=step, **gains)
+    states = rollout(plant, profile, end + WINDOW, step=step, drives=gains)
     after = states.times >= end - step / 2
     stride = round(1.0 / (RATE * step))
     return states.times[after][::stride] - end, states.positions[after][::stride]

@@ -172,7 +172,7 @@ def test_a_tool_that_is_interrupted_ends_with_130_and_no_word(graph, number):
 
 
 def test_a_tool_whose_reader_goes_away_says_nothing(graph):
-    program = f"{sys.executable} -c '{CODE.format('flat_plan')}' joint1=1 --duration 1 --json -"
+    program = f"{sys.executable} -c '{CODE.format('flat_plan')}' joint1=1 --duration 1"
     process = graph.run(['bash', '-c', f'{program} | head -c 10'])
     assert process.wait() == 0
     assert process.stderr == ''
