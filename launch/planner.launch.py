@@ -111,7 +111,7 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument(
                 'dds_profile',
-                default_value='auto',
+                default_value='none',
                 description='profiles of Fast DDS; auto = config/dds/fastdds.xml of this package, '
                 'unless the environment names a file; none = leave Fast DDS as it is',
             ),
