@@ -50,7 +50,7 @@ setup(
             'ros-jazzy-std-srvs==5.3.6',
             'ros-jazzy-trajectory-msgs==5.3.6',
         ],
-        'record': ['mcap>=1.6,<2', 'rosbags>=0.10,<0.12', 'zstandard>=0.22,<1'],
+        'record': ['mcap>=1.6,<2', 'zstandard>=0.22,<1'],
         'live': ['aiohttp>=3.9,<4'],
         # Completion of the programs' options in a shell.
         'complete': ['argcomplete>=3,<4'],

@@ -106,7 +106,7 @@ class TurnCounter:
         if former is not None:
             change = sample.positions - former.positions
             # Cheap, and enough to tell that no joint has moved by more than pi; not so with a NaN.
-            if not change.dot(change) <= pi**2:
+            if not np.abs(change).max() <= pi:
                 self._count(former, sample)
         elif self._place is not None:
             self.align(self._place)

@@ -26,6 +26,9 @@ from flat_planner_ros.core.monitor.settings import MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import is_noticed, OffsetFilter, SampleClock
 import numpy as np
 
+UNUSABLE = 1e6
+"""Angle from which a sample is of no joint [rad]: damaged, or never set."""
+
 SAME_CLOCK = 3600.0
 """Time before its start within which a plan that arrives is of the node's own clock [s]."""
 
@@ -191,8 +194,9 @@ class VibrationMonitor:
         time, positions = sample.time, sample.positions
         if time < self._last_sample - self.settings.timeout:
             self._reset_by(self._last_sample - time)
-        # The sum of squares is finite only if all positions are.
-        if not (time > self._last_sample and isfinite(time + float(positions.dot(positions)))):
+        # NaN is not below anything.
+        is_known = bool(np.abs(positions).max() < UNUSABLE)
+        if not (is_known and time > self._last_sample and isfinite(time)):
             self._dropped += 1
             return []
         self._advance(time)

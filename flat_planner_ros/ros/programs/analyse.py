@@ -43,17 +43,16 @@ from flat_planner_ros.ros.programs.outputs import (
     write_through,
 )
 from flat_planner_ros.ros.wire import diagnostics, interfaces
-from flat_planner_ros.ros.wire.message_types import message_class
-from rclpy.serialization import deserialize_message
 
 if TYPE_CHECKING:
     from flat_planner_ros.ros.recording.recording import Recording
     from flat_planner_ros.ros.recording.replay import Judgement, Sources
 
-DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
-
 AGREEMENT = 1e-9
 """Relative difference up to which a recorded report says the same, in 9 printed digits [-]."""
+
+DAMAGED = 'the recording is cut short or damaged'
+"""What is said before the damage."""
 
 UNITS = {
     'start_time': 's',
@@ -98,6 +97,10 @@ def main(args: Sequence[str] | None = None) -> int:
         return explain_missing(error, 'record')
     try:
         recording = Recording(options.file)
+    except (FlatPlannerError, OSError) as error:
+        print(f'analyse: {error}', file=sys.stderr)
+        return 1
+    try:
         sources = find_sources(
             recording,
             namespace=options.namespace,
@@ -115,7 +118,8 @@ def main(args: Sequence[str] | None = None) -> int:
         if options.plot is not None:
             _draw(judgements, options.plot)
     except FlatPlannerError as error:
-        print(f'analyse: {error}', file=sys.stderr)
+        damage = f'; {DAMAGED}: {recording.damage}' if recording.damage else ''
+        print(f'analyse: {error}{damage}', file=sys.stderr)
         return 1
     except OSError as error:
         print(f'analyse: {explain_os(error)}', file=sys.stderr)
@@ -205,7 +209,7 @@ def _tell(
     differences = _compared(reports, _recorded_reports(recording, sources))
     print(f'{options.file}: plans from {sources.plan}, joint states from {sources.joint_states}')
     if recording.damage:
-        print(f'the recording is cut short or damaged: {recording.damage}')
+        print(f'{DAMAGED}: {recording.damage}')
     for remark in remarks:
         print(remark)
     if not reports:
@@ -239,8 +243,7 @@ def _recorded_reports(
     namespace = sources.plan.removesuffix(interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN))
     topic = namespace + interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
     reports: dict[float, Mapping[str, Any]] = {}
-    for entry in recording.entries({topic}):
-        msg = deserialize_message(entry.message, message_class(entry.kind))
+    for _, msg in recording.messages({topic}):
         for status in msg.status:
             values: dict[str, Any] = {pair.key: _value(pair.value) for pair in status.values}
             if 'start_time' in values:

@@ -24,10 +24,8 @@ from flat_planner_ros.ros.recording.recording import Recording
 from flat_planner_ros.ros.recording.replay import find_topic, JOINT_STATE
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
-from flat_planner_ros.ros.wire.message_types import message_class
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
-from rclpy.serialization import deserialize_message
 
 APART = 10.0
 """Time put between two recordings [s]: a gap that no segment spans."""
@@ -87,8 +85,7 @@ def _samples(
     name = find_topic(recording, JOINT_STATE, topic, namespace, JOINT_STATES, '--joint-states')
     reader = JointStateReader(joints)
     samples: list[JointSample] = []
-    for entry in recording.entries({name}):
-        msg = deserialize_message(entry.message, message_class(entry.kind))
+    for entry, msg in recording.messages({name}):
         try:
             found = reader.read(msg, partial(float, entry.time / NANOSECONDS))
         except InvalidRequest:

@@ -15,19 +15,25 @@
 """Recordings: one MCAP file as `ros2 bag` and Foxglove have it, written and read again."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+import json
 from pathlib import Path
-import struct
-from typing import NamedTuple
+from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError
-from mcap.exceptions import McapError
-from mcap.records import Channel, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from flat_planner_ros.ros.recording.storage import (
+    Entry,
+    Item,
+    items,
+    Note,
+    storage_files,
+    Topic,
+)
+from flat_planner_ros.ros.wire.message_types import message_class
 from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
-from zstandard import ZstdError
+from rclpy.serialization import deserialize_message
 
 PARAMETERS = 'flat_planner_ros parameters'
 """Name of the metadata records that hold the parameters of a node, as they were at a time."""
@@ -39,12 +45,8 @@ CHUNK_SIZE = 256 * 1024
 """Size of the pieces that are compressed together, before compression [bytes]."""
 
 
-DAMAGES = (McapError, ZstdError, struct.error, ValueError, LookupError)
-"""Errors of the library where a file is cut short or spoilt."""
-
-
-class UnreadableRecording(FlatPlannerError):
-    """A file that is no recording; the message says why."""
+UNREADABLE = (rclpy_implementation.RMWError, ValueError, MemoryError)
+"""Errors of a message that is not what its type says."""
 
 
 class RecordingWriter:
@@ -145,15 +147,6 @@ class RecordingWriter:
         return self._writer
 
 
-class Entry(NamedTuple):
-    """A message: its topic and type, when it came [ns since 1970], and itself, serialised."""
-
-    topic: str
-    kind: str
-    time: int
-    message: bytes
-
-
 class Recording:
     """
     A recording to be read.
@@ -161,8 +154,8 @@ class Recording:
     Parameters
     ----------
     path
-        MCAP file, complete or cut short; or, with the library `rosbags`, any directory or file
-        that `ros2 bag` writes.
+        MCAP file or sqlite3 bag of any name, compressed or not, complete or cut short, or a
+        directory with such files.
 
     Attributes
     ----------
@@ -171,7 +164,7 @@ class Recording:
     parameters : list[tuple]
         Parameters of nodes: time [ns since 1970], name with namespace, JSON text of the values.
     damage
-        Place and reason at which reading ends early, empty for a complete recording.
+        What is not whole, empty for a complete recording.
 
     Raises
     ------
@@ -181,72 +174,61 @@ class Recording:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self._files = storage_files(path)
+        self._damages: list[str] = []
+        self._damaged: set[tuple[str, int]] = set()
         self.topics: dict[str, str] = {}
         self.parameters: list[tuple[int, str, str]] = []
-        self.damage = ''
-        self._is_mcap = path.suffix == '.mcap' and not path.is_dir()
-        if self._is_mcap:
-            for record in self._records():
-                if isinstance(record, Metadata) and record.name == PARAMETERS:
-                    values = record.metadata
-                    known = int(values['time']), values['node'], values['values']
-                    self.parameters.append(known)
-        else:
-            for _ in self._bag_entries(()):
-                pass
+        for item in self._items():
+            if isinstance(item, Topic):
+                self.topics[item.name] = item.kind
+            elif isinstance(item, Note) and item.name == PARAMETERS:
+                self._keep_parameters(item.values)
+
+    @property
+    def damage(self) -> str:
+        """Return what is not whole, a clause; empty for a complete recording."""
+        damages = list(self._damages)
+        if self._damaged:
+            topics = ', '.join(sorted({topic for topic, _ in self._damaged}))
+            damages.append(f'{len(self._damaged)} messages cannot be read, on {topics}')
+        return '; '.join(damages)
 
     def entries(self, topics: Collection[str]) -> list[Entry]:
         """Return the messages of some topics in the order of their arrival."""
-        entries = self._mcap_entries(topics) if self._is_mcap else self._bag_entries(topics)
-        return sorted(entries, key=lambda entry: entry.time)
+        entries = (item for item in self._items() if isinstance(item, Entry))
+        wanted = [entry for entry in entries if entry.topic in topics]
+        return sorted(wanted, key=lambda entry: entry.time)
 
-    def _mcap_entries(self, topics: Collection[str]) -> Iterator[Entry]:
-        """Yield the messages of some topics of an MCAP file."""
-        names: dict[int, str] = {}
-        for record in self._records():
-            if isinstance(record, Channel):
-                names[record.id] = record.topic
-            elif isinstance(record, Message) and names[record.channel_id] in topics:
-                name = names[record.channel_id]
-                yield Entry(name, self.topics[name], record.log_time, record.data)
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[Entry, Any]]:
+        """Yield the entries of some topics with their messages; damaged ones are counted."""
+        for entry in self.entries(topics):
+            try:
+                msg = deserialize_message(entry.message, message_class(entry.kind))
+            except UNREADABLE:
+                self._damaged.add((entry.topic, entry.time))
+                continue
+            yield entry, msg
 
-    def _records(self) -> Iterator[McapRecord]:
-        """Yield the records of an MCAP file from its start: the index may be missing."""
-        schemas: dict[int, str] = {}
-        is_read = False
-        try:
-            with self._path.open('rb') as file:
-                for record in StreamReader(file, validate_crcs=True).records:
-                    is_read = True
-                    if isinstance(record, Schema):
-                        schemas[record.id] = record.name
-                    elif isinstance(record, Channel):
-                        self.topics[record.topic] = schemas[record.schema_id]
-                    yield record
-        except DAMAGES as error:
-            if not is_read:
-                raise UnreadableRecording(f'{self._path} is no MCAP file') from error
-            self.damage = str(error) or 'the file ends early'
-        except OSError as error:
-            raise UnreadableRecording(f'cannot read {self._path}: {error.strerror}') from error
+    def _items(self) -> Iterator[Item]:
+        """Yield what all files have in them."""
+        for file in self._files:
+            yield from items(file, self._complain)
 
-    def _bag_entries(self, topics: Collection[str]) -> Iterator[Entry]:
-        """Yield the messages of some topics of a bag of another storage, or in a directory."""
+    def _complain(self, damage: str) -> None:
+        """Keep a damage, once."""
+        if damage not in self._damages:
+            self._damages.append(damage)
+
+    def _keep_parameters(self, values: Mapping[str, str]) -> None:
+        """Keep the parameters of a node, if the record is whole."""
         try:
-            from rosbags.rosbag2 import Reader, ReaderError
-        except ImportError as error:
-            raise UnreadableRecording(
-                f'{self._path} needs the library rosbags: pip install rosbags'
-            ) from error
-        try:
-            with Reader(self._path) as reader:
-                self.topics = {c.topic: c.msgtype for c in reader.connections}
-                wanted = [c for c in reader.connections if c.topic in topics]
-                for connection, time, message in reader.messages(wanted) if wanted else ():
-                    yield Entry(connection.topic, connection.msgtype, time, bytes(message))
-        except (ReaderError, OSError) as error:
-            raise UnreadableRecording(f'cannot read {self._path}: {error}') from error
+            known = int(values['time']), values['node'], values['values']
+            dict(json.loads(known[2]))
+        except (ValueError, LookupError, TypeError):
+            self._complain('parameters of a node cannot be read')
+            return
+        self.parameters.append(known)
 
 
 def _offer(quality: QoSProfile) -> str:

@@ -28,15 +28,14 @@ from flat_planner_ros.core.monitor import (
     VibrationReport,
 )
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
-from flat_planner_ros.ros.recording.recording import Entry, Recording
+from flat_planner_ros.ros.recording.recording import Recording
+from flat_planner_ros.ros.recording.storage import Entry
 from flat_planner_ros.ros.wire import conversions, stamps
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, PLAN, PLANNER, topic_of
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
-from flat_planner_ros.ros.wire.message_types import message_class
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
 from rclpy.parameter import Parameter
-from rclpy.serialization import deserialize_message
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
@@ -128,7 +127,13 @@ def recorded_settings(recording: Recording, sources: Sources) -> list[tuple[int,
     for time, node, text in recording.parameters:
         if node == f'{namespace}/{MONITOR}':
             values = {k: v for k, v in json.loads(text).items() if k in known}
-            settings.append((time, monitor_parameters.build({**defaults, **values})))
+            try:
+                settings.append((time, monitor_parameters.build({**defaults, **values})))
+            except (TypeError, ValueError) as error:
+                raise NothingToJudge(
+                    f'the recorded parameters of {node} cannot be read ({error}); give '
+                    '--params-file'
+                ) from error
     return settings
 
 
@@ -155,10 +160,10 @@ def replay(
     """
     player = _Player(settings[0][1], remark)
     changes = list(settings[1:])
-    for entry in recording.entries({sources.plan, sources.joint_states}):
+    for entry, msg in recording.messages({sources.plan, sources.joint_states}):
         while changes and changes[0][0] <= entry.time:
             player.apply(changes.pop(0)[1])
-        player.take(entry)
+        player.take(entry, msg)
     player.end()
     return player.judgements
 
@@ -185,9 +190,8 @@ class _Player:
         if self._reader is not None:
             self._reader.rules = settings.joint_states
 
-    def take(self, entry: Entry) -> None:
+    def take(self, entry: Entry, msg: Any) -> None:
         """Take a message; one that cannot be used is left out, as in the node."""
-        msg = deserialize_message(entry.message, message_class(entry.kind))
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
         with suppress(FlatPlannerError):
             take(msg, entry.time / NANOSECONDS)

@@ -43,11 +43,8 @@ highlevel = pytest.importorskip('rosbags.highlevel')
 
 from flat_planner_ros.ros.programs import analyse  # noqa: E402, I100  They need it.
 from flat_planner_ros.ros.recording.recorder_node import RecorderNode  # noqa: E402
-from flat_planner_ros.ros.recording.recording import (  # noqa: E402
-    Recording,
-    RecordingWriter,
-    UnreadableRecording,
-)
+from flat_planner_ros.ros.recording.recording import Recording, RecordingWriter  # noqa: E402
+from flat_planner_ros.ros.recording.storage import UnreadableRecording  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 
 OURS = {
@@ -479,7 +476,7 @@ def test_a_motion_is_drawn(graph, tmp_path):
         ('no.mcap', None, 'No such file'),
         ('text.mcap', b'hello', 'is no MCAP file'),
         ('empty.mcap', b'', 'is no MCAP file'),
-        ('x.txt', b'hello', 'cannot read'),
+        ('x.txt', b'hello', 'is no MCAP file and no sqlite3 bag, by its content'),
     ],
 )
 def test_what_is_no_recording_is_one_line(tmp_path, capsys, name, content, text):
