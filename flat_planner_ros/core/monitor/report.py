@@ -19,10 +19,10 @@ from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor.course import compare, Course, judge_arrival
+from flat_planner_ros.core.monitor.doubtful_samples import doubt_of_times, seen_oscillation
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion
 from flat_planner_ros.core.monitor.oscillation import OscillationFit
-from flat_planner_ros.core.monitor.sampling import doubt_of_times, seen_oscillation
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import SampleClock
 import numpy as np
