@@ -91,18 +91,22 @@ def write_sqlite(path: Path, *, compressed: bool = False) -> None:
         database.commit()
 
 
-def analysed(path: Path, capsys) -> tuple[int, str, str]:
-    """Return exit code, output and errors of the program."""
-    code = analyse.main(['analyse', str(path), '--json', '--window', str(WINDOW)])
+def analysed(path: Path, capsys) -> tuple[int, str, str, dict]:
+    """Return exit code, output, errors and what the program writes, nothing where it fails."""
+    written = path.with_name('report.json')
+    written.unlink(missing_ok=True)
+    command = ['analyse', str(path), '--json', str(written), '--window', str(WINDOW)]
+    code = analyse.main(command)
     output = capsys.readouterr()
-    return code, output.out, output.err
+    document = json.loads(written.read_text()) if written.exists() else {}
+    return code, output.out, output.err, document
 
 
 def amplitude(path: Path, capsys) -> float:
     """Return the amplitude of the only report, which must be there."""
-    code, out, err = analysed(path, capsys)
+    code, _, err, document = analysed(path, capsys)
     assert (code, err) == (0, '')
-    (report,) = json.loads(out)['reports']
+    (report,) = document['reports']
     return report['values']['amplitude']
 
 
@@ -139,8 +143,7 @@ def test_a_directory_is_read_whatever_its_metadata(metadata, tmp_path, capsys):
 
 def test_damaged_messages_are_left_out_and_counted(tmp_path, capsys):
     write_mcap(tmp_path / 'a.mcap', spoilt=7)
-    code, out, err = analysed(tmp_path / 'a.mcap', capsys)
-    document = json.loads(out)
+    code, _, err, document = analysed(tmp_path / 'a.mcap', capsys)
     assert (code, err) == (0, '')
     assert document['damage'] == '7 messages cannot be read, on /joint_states'
     assert document['reports'][0]['values']['amplitude'] == pytest.approx(SWING, rel=1e-3)
@@ -150,7 +153,7 @@ def test_a_file_without_its_plan_says_that_it_is_cut(tmp_path, capsys):
     write_mcap(tmp_path / 'a.mcap')
     data = (tmp_path / 'a.mcap').read_bytes()
     (tmp_path / 'a.mcap').write_bytes(data[:200])
-    code, _, err = analysed(tmp_path / 'a.mcap', capsys)
+    code, _, err, _ = analysed(tmp_path / 'a.mcap', capsys)
     assert code == 1
     assert 'the recording is cut short or damaged' in err
 
@@ -158,7 +161,7 @@ def test_a_file_without_its_plan_says_that_it_is_cut(tmp_path, capsys):
 @pytest.mark.parametrize('content', [b'', b'hello', b'\x28\xb5\x2f\xfd', b'\x89MCAP0\r\n'])
 def test_what_is_no_recording_is_said_in_a_line(content, tmp_path, capsys):
     (tmp_path / 'a').write_bytes(content)
-    code, _, err = analysed(tmp_path / 'a', capsys)
+    code, _, err, _ = analysed(tmp_path / 'a', capsys)
     assert code == 1
     assert err.startswith('analyse: ')
     assert err.count('\n') == 1
@@ -171,7 +174,7 @@ def test_other_types_under_the_usual_names_are_said_in_a_line(tmp_path, capsys):
         writer.add_topic(topic, kind, definition(kind), [interfaces.RELIABLE])
         writer.write(topic, 10**9, serialize_message(String(data='x')))
     writer.close()
-    code, _, err = analysed(tmp_path / 'a.mcap', capsys)
+    code, _, err, _ = analysed(tmp_path / 'a.mcap', capsys)
     assert code == 1
     assert 'no topic flat_planner/plan of type' in err
     assert err.count('\n') == 1
@@ -203,7 +206,7 @@ def test_no_damage_ends_in_a_traceback(write, form, tmp_path, capsys):
     codes = set()
     for content in spoilt:
         path.write_bytes(content)
-        code, out, err = analysed(path, capsys)
+        code, out, err, _ = analysed(path, capsys)
         codes.add(code)
         assert code == 0 or out or err.count('\n') == 1
         assert code == 0 or out or err.startswith('analyse: ')
