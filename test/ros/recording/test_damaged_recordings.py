@@ -211,3 +211,26 @@ def test_no_damage_ends_in_a_traceback(write, form, tmp_path, capsys):
         assert code == 0 or out or err.count('\n') == 1
         assert code == 0 or out or err.startswith('analyse: ')
     assert 1 in codes
+
+
+def test_a_topic_may_have_several_channels_and_others_no_schema(tmp_path, capsys):
+    """As converters and splitters write them; a later channel of a topic may be announced late."""
+    from mcap.writer import Writer
+
+    path = tmp_path / 'a.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file)
+        writer.start(profile='ros2')
+        bare = writer.register_channel('/note', 'json', 0)
+        writer.add_message(bare, 1, b'{}', 1)
+        for number, (topic, time, data) in enumerate(messages()):
+            if number % 50 == 0:
+                channels = {}
+            if topic not in channels:
+                kind = KINDS[topic]
+                schema = writer.register_schema(kind, 'ros2msg', definition(kind).encode())
+                channels[topic] = writer.register_channel(topic, 'cdr', schema)
+            stamp = round((START + time) * 1e9)
+            writer.add_message(channels[topic], stamp, data, stamp)
+        writer.finish()
+    assert amplitude(path, capsys) == pytest.approx(SWING, rel=1e-3)
