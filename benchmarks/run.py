@@ -36,10 +36,11 @@ BENCHMARKS = (
     'via_points',
     'duration',
     'model_fit',
+    'tracking',
 )
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration', 'model_fit')
+WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration', 'model_fit', 'tracking')
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'
