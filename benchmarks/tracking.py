@@ -202,7 +202,7 @@ class _Run:
 
     @property
     def _beyond(self) -> np.ndarray:
-        """Times at which an error is beyond the band [s]."""
+        """Return the times at which an error is beyond the band [s]."""
         kernel = np.ones(self._width) / self._width
         smooth = np.array([np.convolve(e, kernel, mode='same') for e in self._errors.T])
         found: np.ndarray = self._times[np.abs(smooth).max(axis=0) > BAND]
