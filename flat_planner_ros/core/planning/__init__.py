@@ -30,10 +30,11 @@ from flat_planner_ros.core.planning.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
-from flat_planner_ros.core.planning.strategies import check_options
+from flat_planner_ros.core.planning.strategies import check_options, shortest_known
 from flat_planner_ros.core.planning.tradeoff import (
     baselines,
     duration_advice,
+    fastest_points,
     residual_of_plan,
     time_advice,
     tradeoff_points,
@@ -48,6 +49,7 @@ __all__ = [
     'duration_advice',
     'Extrema',
     'extrema_of',
+    'fastest_points',
     'JointLimits',
     'LimitUse',
     'MotionRequest',
@@ -62,6 +64,7 @@ __all__ = [
     'Quantity',
     'Reason',
     'RequestRejected',
+    'shortest_known',
     'shortest_plan',
     'stop_plan',
     'DurationRules',

@@ -38,8 +38,10 @@ from flat_planner_ros.core.insensitive import (
 )
 from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
+from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
+from flat_planner_ros.core.planning.shortest_duration import shortest_plan
 from flat_planner_ros.core.planning.strategies import shortest_known
 import numpy as np
 
@@ -58,6 +60,9 @@ STRETCHES = (1.05, 1.1, 1.2)
 
 PAYS = 0.5
 """Share of the worst residual, or less, that must be left for a stretch to pay [-]."""
+
+DURATIONS = (0.01, 600.0)
+"""Range in which the shortest duration is looked for [s]."""
 
 WORTHWHILE = 0.95
 """Share of the duration, or less, that another strategy must take to be advised [-]."""
@@ -268,6 +273,56 @@ def tradeoff_points(
         stretched = replace(request, duration=stretch * request.duration)
         for nominal in Nominal:
             points += _sweep(stretched, arm, options, nominal, weights)
+    return tuple(points)
+
+
+def fastest_points(
+    request: MotionRequest, arm: PlanarArm, options: PlanningOptions, limit: float
+) -> tuple[TradeoffPoint, ...]:
+    """
+    Return the shortest motion of each strategy within a limit, and what it leaves.
+
+    Parameters
+    ----------
+    request
+        A motion from rest to rest; its duration does not matter.
+    arm, options
+        As for `tradeoff_points`.
+    limit
+        On the effort of joint n-1 [N m].
+
+    Raises
+    ------
+    NoFeasibleDuration
+        No motion of `DURATIONS` keeps the limit.
+    FlatPlannerError
+        The arm or the request allows no plan.
+
+    """
+    effort = np.full(arm.n, np.inf)
+    effort[-2] = limit
+    limits = JointLimits.of(arm.n, effort=effort)
+    peak = replace(options, strategy=Strategy.MIN_PEAK_EFFORT)
+    wanted = {
+        **{strategy.value: replace(options, strategy=strategy) for strategy in STRATEGIES},
+        Strategy.MIN_PEAK_EFFORT.value: peak,
+        f'{Strategy.MIN_PEAK_EFFORT.value}, insensitive': replace(
+            peak, peak=replace(options.peak, insensitive=True)
+        ),
+    }
+    shortest, longest = DURATIONS
+    points = []
+    for name, chosen in wanted.items():
+        found = shortest_plan(
+            lambda duration, chosen=chosen: plan(  # type: ignore[misc]
+                request.stretched(duration), arm, chosen
+            ),
+            limits,
+            shortest=shortest,
+            longest=longest,
+            bound=shortest_known(request, arm, chosen, limit),
+        )
+        points.append(_point_of(name, found))
     return tuple(points)
 
 

@@ -29,6 +29,7 @@ import sys
 
 from flat_planner_ros.core.arm import FlatModel, FlatPlannerError
 from flat_planner_ros.core.planning import (
+    fastest_points,
     MotionRequest,
     PlanningOptions,
     tradeoff_points,
@@ -71,9 +72,13 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     options = _options(args)
     try:
-        points, box = _points(options)
+        points, fastest, box = _points(options)
         with redirect_stdout(summary_stream(options.csv, options.plot)):
             _print(points, box)
+            if fastest:
+                print(f'shortest within {options.max_effort:g} N m:')
+                for point in fastest:
+                    print(_line(point))
         if options.csv is not None:
             _write_csv(points, options.csv)
         if options.plot is not None:
@@ -132,6 +137,12 @@ def _options(args: Sequence[str] | None) -> Namespace:
     )
     parser.add_argument('--duration', metavar='S', type=float, required=True, help='of the motion')
     parser.add_argument(
+        '--max-effort',
+        metavar='N_M',
+        type=float,
+        help='also print the shortest motion of each strategy within this effort',
+    )
+    parser.add_argument(
         '--stretch',
         metavar='RATIO',
         type=float,
@@ -149,8 +160,10 @@ def _options(args: Sequence[str] | None) -> Namespace:
     return options
 
 
-def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
-    """Return all points, and the uncertainty in words."""
+def _points(
+    options: Namespace,
+) -> tuple[tuple[TradeoffPoint, ...], tuple[TradeoffPoint, ...], str]:
+    """Return all points, the fastest within a limit, and the uncertainty in words."""
     settings = read_settings(
         options.params_file,
         planner_parameters.ROWS,
@@ -171,16 +184,20 @@ def _points(options: Namespace) -> tuple[tuple[TradeoffPoint, ...], str]:
         flat_model=FlatModel.EXACT,
         insensitivity=planning.insensitivity,
         drive=planning.drive,
+        peak=planning.peak,
     )
+    fastest: tuple[TradeoffPoint, ...] = ()
+    if options.max_effort is not None:
+        fastest = fastest_points(request, arm, wanted, options.max_effort)
     text = str(planning.insensitivity.box).replace('+-', '±')
-    return tradeoff_points(request, arm, wanted, stretches=options.stretch), text
+    return tradeoff_points(request, arm, wanted, stretches=options.stretch), fastest, text
 
 
 def _print(points: Sequence[TradeoffPoint], box: str) -> None:
     """Print what is no sweep, and the nearest of each sweep to it."""
     print(f'worst residual over {box}')
-    print(' method                | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]')
-    print('-----------------------+--------------+------------------+---------------+------------')
+    print(f' {"method":<28} | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]')
+    print('+'.join('-' * width for width in (30, 14, 18, 15, 12)))
     for point in points:
         if point.weight == 0.0:
             print(_line(point))
@@ -203,7 +220,7 @@ def _print(points: Sequence[TradeoffPoint], box: str) -> None:
 def _line(point: TradeoffPoint) -> str:
     """Return a row of the table."""
     return (
-        f' {point.series:<21} | {point.duration:<12.4g} | {point.rms_effort:<16.4g} | '
+        f' {point.series:<28} | {point.duration:<12.4g} | {point.rms_effort:<16.4g} | '
         f'{point.nominal:<13.2g} | {point.worst:.4g}'
     )
 

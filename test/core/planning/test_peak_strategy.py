@@ -26,6 +26,7 @@ from flat_planner_ros.core.planning import (
     check_options,
     DurationRules,
     extrema_of,
+    fastest_points,
     JointLimits,
     MotionRequest,
     OnViolation,
@@ -224,3 +225,12 @@ def test_a_stop_is_where_the_least_peak_leads():
             start_jets=now.planned[:, :6, 0],
         )
         assert plan(elsewhere, ARM, OPTIONS).cost_value > found.cost_value * (1.0 - 1e-9)
+
+
+def test_the_trade_of_time_against_residual():
+    points = {point.series: point for point in fastest_points(request(), ARM, OPTIONS, LIMIT)}
+    assert all(point.peak_effort <= LIMIT * (1.0 + 1e-9) for point in points.values())
+    fastest, robust = points['min_peak_effort'], points['min_peak_effort, insensitive']
+    assert min(points.values(), key=lambda point: point.duration) is fastest
+    assert fastest.nominal < 1e-9
+    assert robust.worst < 0.2 * fastest.worst

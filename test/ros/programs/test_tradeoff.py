@@ -45,6 +45,16 @@ def test_numbers_and_a_picture(tmp_path, capsys):
     assert 'zvd_quintic' in capsys.readouterr().out
 
 
+def test_the_shortest_within_an_effort(capsys):
+    assert tradeoff.main([*MOTION, '--max-effort', '0.015']) == 0
+    said = capsys.readouterr().out
+    shortest = said.partition('shortest within 0.015 N m:')[2].splitlines()
+    durations = {row.split('|')[0].strip(): row.split('|')[1] for row in shortest if '|' in row}
+    assert float(durations['min_peak_effort']) == pytest.approx(0.845, abs=1e-3)
+    assert float(durations['min_peak_effort, insensitive']) == pytest.approx(1.039, abs=1e-3)
+    assert float(durations['min_control_effort']) > 0.94
+
+
 def test_parameters_decide(tmp_path):
     wide, narrow = tmp_path / 'wide.csv', tmp_path / 'narrow.csv'
     tradeoff.main([*MOTION, '--csv', str(narrow)])
