@@ -288,6 +288,42 @@ class PlanarArm(ArmDynamics):
             damping=damping * self.damping,
         )
 
+    def with_last_links(
+        self,
+        *,
+        inertia_star: tuple[float, float],
+        stiffness: float,
+        damping: float,
+        viscous: float,
+        coulomb: float,
+    ) -> 'PlanarArm':
+        """
+        Return a copy that differs in what moves the last two links.
+
+        Parameters
+        ----------
+        inertia_star
+            I*_{n-1} and I*_n [kg m^2].
+        stiffness, damping
+            Passive joint [N m/rad], [N m s/rad].
+        viscous, coulomb
+            Friction of joint n-1 [N m s/rad], [N m].
+
+        """
+        both, last = inertia_star
+        inertia = self.inertia.copy()
+        inertia[-2, -2], inertia[-1, -1] = both - last, last
+        frictions = self.viscous_friction.copy(), self.coulomb_friction.copy()
+        frictions[0][-1], frictions[1][-1] = viscous, coulomb
+        return replace(
+            self,
+            inertia=inertia,
+            stiffness=stiffness,
+            damping=damping,
+            viscous_friction=frictions[0],
+            coulomb_friction=frictions[1],
+        )
+
     @property
     def inertia_star(self) -> InertiaStar:
         """Return I*_{n-1} and I*_n [kg m^2]; raise NotFlat if the arm has no such constants."""

@@ -364,16 +364,12 @@ def _estimates(
 
 
 def _arm(start: PlanarArm, values: FloatArray) -> PlanarArm:
-    """Return the arm with the values of the last two links."""
-    inertia = start.inertia.copy()
-    inertia[-2, -2], inertia[-1, -1] = values[BOTH] - values[LAST], values[LAST]
-    viscous, coulomb = start.viscous_friction.copy(), start.coulomb_friction.copy()
-    viscous[-1], coulomb[-1] = max(values[VISCOUS], 0.0), max(values[COULOMB], 0.0)
-    return replace(
-        start,
-        inertia=inertia,
+    """Return the arm with the values of the last two links; none of them is negative."""
+    damping, viscous, coulomb = np.maximum(values[[DAMPING, VISCOUS, COULOMB]], 0.0).tolist()
+    return start.with_last_links(
+        inertia_star=(float(values[BOTH]), float(values[LAST])),
         stiffness=float(values[STIFFNESS]),
-        damping=max(float(values[DAMPING]), 0.0),
-        viscous_friction=viscous,
-        coulomb_friction=coulomb,
+        damping=damping,
+        viscous=viscous,
+        coulomb=coulomb,
     )

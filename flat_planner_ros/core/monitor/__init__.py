@@ -17,14 +17,17 @@
 from flat_planner_ros.core.monitor.adoption import (
     Adoption,
     AdoptionRefused,
+    Estimate,
     ModelTuner,
     ReportedEstimate,
+    ReportedModel,
 )
 from flat_planner_ros.core.monitor.identification import (
     ActuatedJoints,
     identify,
     StiffnessEstimate,
 )
+from flat_planner_ros.core.monitor.model_estimate import LastLinks, ModelEstimate
 from flat_planner_ros.core.monitor.motion_record import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.monitor.report import VibrationReport
@@ -35,15 +38,19 @@ __all__ = [
     'ActuatedJoints',
     'Adoption',
     'AdoptionRefused',
+    'Estimate',
     'fit_oscillation',
     'identify',
     'joint_indices',
+    'LastLinks',
     'Level',
+    'ModelEstimate',
     'ModelTuner',
     'MonitorSettings',
     'OscillationFit',
     'PlannedMotion',
     'ReportedEstimate',
+    'ReportedModel',
     'Residual',
     'StiffnessEstimate',
     'VibrationMonitor',

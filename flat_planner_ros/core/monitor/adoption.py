@@ -12,12 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rules by which a planner takes over an estimate of its arm's stiffness and damping."""
+"""Rules by which a planner takes over an estimate of its arm."""
 
 from dataclasses import dataclass, replace
+from math import isfinite
 
 from flat_planner_ros.core.arm import check_number, FlatPlannerError, InvalidRequest, PlanarArm
 from flat_planner_ros.core.monitor.identification import ActuatedJoints, oscillating_inertia
+from flat_planner_ros.core.monitor.model_estimate import LastLinks
 
 INERTIA_TOLERANCE = 1e-6
 """Largest difference of an estimate's nominal inertia from the planner's, relative [-]."""
@@ -80,6 +82,19 @@ class ReportedEstimate:
         """Return whether the estimate follows the motion with a start [s]."""
         return abs(self.start_time - start) <= SAME_START
 
+    def check_basis(self, arm: PlanarArm) -> None:
+        """Raise AdoptionRefused if the estimate rests on other inertias than the arm's."""
+        inertia = oscillating_inertia(arm, self.case)
+        if abs(self.inertia - inertia) > INERTIA_TOLERANCE * inertia:
+            raise AdoptionRefused(
+                f'the estimate rests on a nominal inertia of {self.inertia:.6g} kg m^2, the '
+                f'model here has {inertia:.6g} kg m^2: give both nodes the same model'
+            )
+
+    def tuned(self, arm: PlanarArm) -> PlanarArm:
+        """Return the arm with what is estimated."""
+        return replace(arm, stiffness=self.stiffness, damping=self.damping)
+
     def agrees_with(self, arm: PlanarArm) -> bool:
         """Return whether the arm has these values but for the standard errors."""
         return all(
@@ -89,6 +104,67 @@ class ReportedEstimate:
                 (self.damping, arm.damping, self.damping_std),
             )
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportedModel:
+    """
+    Trustworthy estimate of the whole model of the last two links, as a monitor reports it.
+
+    Attributes
+    ----------
+    start_time
+        Start of the motion that told it [s].
+    joint
+        Name of the passive joint.
+    values, stds
+        Estimates and standard errors; infinite for friction that was not told.
+
+    """
+
+    start_time: float
+    joint: str
+    values: LastLinks
+    stds: LastLinks
+
+    def __post_init__(self) -> None:
+        """Refuse numbers without meaning."""
+        check_number('start_time', self.start_time, 's', error=InvalidRequest)
+        for name, value in self.values._asdict().items():
+            check_number(name, value, 'SI', lower=0.0, error=InvalidRequest)
+        if not self.values.both > self.values.last > 0.0 < self.values.stiffness:
+            raise InvalidRequest(f'no arm moves like this: {self.values}')
+        if not all(std >= 0.0 for std in self.stds):
+            raise InvalidRequest(f'standard errors must not be negative, got {self.stds}')
+
+    def is_of_motion(self, start: float) -> bool:
+        """Return whether the estimate is of the motion with a start [s]."""
+        return abs(self.start_time - start) <= SAME_START
+
+    def check_basis(self, arm: PlanarArm) -> None:
+        """Accept any arm: the estimate rests on measured efforts alone."""
+
+    def tuned(self, arm: PlanarArm) -> PlanarArm:
+        """Return the arm with what is estimated."""
+        told = LastLinks(
+            *(
+                new if isfinite(std) else old
+                for new, std, old in zip(self.values, self.stds, LastLinks.of(arm), strict=True)
+            )
+        )
+        return told.applied_to(arm)
+
+    def agrees_with(self, arm: PlanarArm) -> bool:
+        """Return whether the arm has these values but for the standard errors."""
+        present = LastLinks.of(arm)
+        return all(
+            abs(new - old) <= AGREEMENT * std + REFINEMENT * old
+            for new, std, old in zip(self.values, self.stds, present, strict=True)
+        )
+
+
+Estimate = ReportedEstimate | ReportedModel
+"""What can be adopted."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,7 +181,7 @@ class Adoption:
 
     """
 
-    estimate: ReportedEstimate
+    estimate: Estimate
     former: PlanarArm
     arm: PlanarArm
 
@@ -120,15 +196,15 @@ class ModelTuner:
 
     def __init__(self) -> None:
         """Wait for an estimate."""
-        self._estimate: ReportedEstimate | None = None
-        self._adopted: ReportedEstimate | None = None
+        self._estimate: Estimate | None = None
+        self._adopted: Estimate | None = None
 
     @property
-    def estimate(self) -> ReportedEstimate | None:
+    def estimate(self) -> Estimate | None:
         """Return the last trustworthy estimate."""
         return self._estimate
 
-    def hear(self, estimate: ReportedEstimate) -> None:
+    def hear(self, estimate: Estimate) -> None:
         """Take a trustworthy estimate."""
         self._estimate = estimate
 
@@ -160,19 +236,13 @@ class ModelTuner:
             )
         if estimate.joint != joint:
             raise AdoptionRefused(f'the estimate is of {estimate.joint}, not of {joint}')
-        inertia = oscillating_inertia(arm, estimate.case)
-        if abs(estimate.inertia - inertia) > INERTIA_TOLERANCE * inertia:
-            raise AdoptionRefused(
-                f'the estimate rests on a nominal inertia of {estimate.inertia:.6g} kg m^2, the '
-                f'model here has {inertia:.6g} kg m^2: give both nodes the same model'
-            )
+        estimate.check_basis(arm)
         if estimate.agrees_with(arm):
             raise AdoptionRefused(
                 f'nothing to adopt: the estimate confirms the present stiffness '
                 f'{arm.stiffness:.6g} N m/rad and damping {arm.damping:.6g} N m s/rad'
             )
-        tuned = replace(arm, stiffness=estimate.stiffness, damping=estimate.damping)
-        return Adoption(estimate=estimate, former=arm, arm=tuned)
+        return Adoption(estimate=estimate, former=arm, arm=estimate.tuned(arm))
 
     def mark_adopted(self, adoption: Adoption) -> None:
         """Remember that an adoption has been made, so that it is not made again."""

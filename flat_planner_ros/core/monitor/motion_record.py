@@ -215,11 +215,14 @@ class Measured:
     ----------
     efforts
         Of the time of the motion [N m].
+    motors
+        Positions [rad] and efforts [N m] side by side from the start on, if they are wanted.
 
     """
 
     def __init__(self, width: int) -> None:
         self.efforts = Record(width)
+        self.motors = Record(2 * width)
         self._during = Record(width)
         self._after = Record(width)
 

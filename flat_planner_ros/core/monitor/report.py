@@ -21,7 +21,8 @@ from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor.course import compare, Course, judge_arrival
 from flat_planner_ros.core.monitor.doubtful_samples import doubt_of_times, seen_oscillation
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
-from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion
+from flat_planner_ros.core.monitor.model_estimate import estimate_model, ModelEstimate
+from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Record
 from flat_planner_ros.core.monitor.oscillation import OscillationFit
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import SampleClock
@@ -70,6 +71,8 @@ class VibrationReport:
         Number of samples in the window [-].
     estimate
         Stiffness and damping of the passive joint, ``None`` without a model to compare with.
+    model
+        All that moves the last two links, ``None`` unless it is asked for.
     course
         How the motion was carried out, ``None`` if too little of it was seen.
     clock_offset
@@ -95,6 +98,7 @@ class VibrationReport:
     estimate: StiffnessEstimate | None = None
     course: Course | None = None
     clock_offset: float | None = None
+    model: ModelEstimate | None = None
 
     @property
     def is_settled(self) -> bool:
@@ -155,6 +159,7 @@ def assess(
     else:
         fit, foreign = seen_oscillation(times, errors[:, -1], done.end, settings)
     estimate = _estimate(times - done.end, errors, fit, settings)
+    model = _model(done, measured.motors, until, settings, doubt)
     frequency = fit.frequency or settings.expected_frequency
     settling = _settling_time(times - done.end, errors[:, -1], settings.settling_band, frequency)
     window = float(times[-1]) - done.end if times.size else 0.0
@@ -179,6 +184,7 @@ def assess(
             _settling_remark(settling, settings.settling_band),
             _effort_remark(motion.joint_names, rms),
             _estimate_remark(estimate, fit),
+            model.text if model else '',
         )
     severity = Level.worst(
         (arrival.level, _level(fit, settings), Level.WARN if foreign else Level.OK)
@@ -202,6 +208,7 @@ def assess(
         estimate=estimate,
         course=course,
         clock_offset=clock.ahead(course) if clock.is_other(course) else None,
+        model=model,
     )
 
 
@@ -224,6 +231,19 @@ def _estimate(
     if joints != arm.n:
         return StiffnessEstimate(reason=f'the plan has {joints} joints, the model {arm.n}')
     return identify(elapsed, errors, fit, arm, settings.actuated_joints)
+
+
+def _model(
+    motion: PlannedMotion, motors: Record, until: float, settings: MonitorSettings, doubt: str
+) -> ModelEstimate | None:
+    """Return the whole model if it is asked for and the joints are the model's."""
+    arm, joints = settings.arm, len(motion.joint_names)
+    if arm is None or not settings.fits_model or joints != arm.n:
+        return None
+    if doubt:
+        return ModelEstimate(reason=doubt)
+    times, rows = motors.between(motion.start, until)
+    return estimate_model(times - motion.start, rows[:, :joints], rows[:, joints:], arm)
 
 
 def _missed(

@@ -82,6 +82,9 @@ class MonitorSettings:
         Nominal model whose stiffness and damping are estimated, or ``None`` for no estimate.
     actuated_joints
         Whether the actuated joints are free or held after a motion.
+    fits_model
+        Whether the whole model of the last two links is fitted to each motion; takes a second or
+        two of the processor.
 
     """
 
@@ -97,6 +100,7 @@ class MonitorSettings:
     expected_damping_ratio: float | None = None
     arm: PlanarArm | None = None
     actuated_joints: ActuatedJoints = ActuatedJoints.AUTO
+    fits_model: bool = False
 
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""

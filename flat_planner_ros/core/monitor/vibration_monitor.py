@@ -218,6 +218,9 @@ class VibrationMonitor:
         if time <= motion.end:
             self._measured.efforts.append(time, nan if sample.efforts is None else sample.efforts)
         self._measured.add(time, positions, is_after=time >= motion.end)
+        if self.settings.fits_model and time >= motion.start:
+            efforts = np.full_like(positions, nan) if sample.efforts is None else sample.efforts
+            self._measured.motors.append(time, np.concatenate((positions, efforts)))
         if time >= motion.end + self.settings.window:
             self._close(time)
         return self._take_reports()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Adoption of estimates: the monitor's stiffness and damping into a planner's parameters."""
+"""Adoption of estimates: what the monitor finds into a planner's parameters."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ from flat_planner_ros.core.monitor import AdoptionRefused, ModelTuner
 from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
-from flat_planner_ros.ros.wire import diagnostics, interfaces
+from flat_planner_ros.ros.wire import estimates, interfaces
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
@@ -65,7 +65,7 @@ class ModelAdoption:
     def _on_report(self, msg: DiagnosticArray) -> None:
         """Keep an estimate, and adopt it at once if it follows the own last motion and may be."""
         try:
-            estimate = diagnostics.reported_estimate(msg)
+            estimate = estimates.reported_estimate(msg)
         except FlatPlannerError as error:
             self._log.warning(f'report ignored: {error}')
             return
@@ -93,11 +93,11 @@ class ModelAdoption:
         """Set the parameters of the model to the last estimate, for the next plan."""
         session = self._settings().session
         adoption = self._tuner.propose(session.arm, session.joints[-1])
-        values = {'stiffness': adoption.arm.stiffness, 'damping': adoption.arm.damping}
-        result = self._node.set_parameters_atomically(model_parameters(**values))
+        changed = model_parameters(self._node, adoption.arm, adoption.former)
+        result = self._node.set_parameters_atomically(changed)
         if not result.successful:
             raise AdoptionRefused(f'the parameters refuse the estimate: {result.reason}')
         self._tuner.mark_adopted(adoption)
-        status = diagnostics.adopted_status(adoption)
+        status = estimates.adopted_status(adoption)
         self._announce(status)
         return status

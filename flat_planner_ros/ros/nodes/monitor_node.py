@@ -36,7 +36,7 @@ from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.monitor import build, ROWS
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.row import InvalidParameter
-from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
+from flat_planner_ros.ros.wire import conversions, diagnostics, estimates, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -180,9 +180,10 @@ class MonitorNode(GuardedNode):
     def _on_status(self, msg: DiagnosticArray) -> None:
         """Expect what the planner expects, once it has adopted other values than its file's."""
         try:
-            values = diagnostics.adopted_values(msg)
-            if values:
-                result = self.set_parameters_atomically(model_parameters(**values))
+            own = self._monitor.settings.arm
+            arm = None if own is None else estimates.adopted_arm(msg, own)
+            if arm is not None and own is not None:
+                result = self.set_parameters_atomically(model_parameters(self, arm, own))
                 if not result.successful:
                     raise InvalidParameter(result.reason)
         except FlatPlannerError as error:

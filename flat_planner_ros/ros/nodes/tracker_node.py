@@ -29,7 +29,7 @@ from flat_planner_ros.ros.nodes.rival_watch import RivalWatch
 from flat_planner_ros.ros.nodes.tracker_renewal import TrackerRenewal
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.tracker import build, ROWS
-from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
+from flat_planner_ros.ros.wire import conversions, diagnostics, estimates, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.tracked_motion import tracked_motion
 from rclpy.clock import Clock, ClockType
@@ -138,7 +138,7 @@ class TrackerNode(GuardedNode):
     def _on_status(self, msg: DiagnosticArray) -> None:
         """Follow the model that the planner adopts, between motions."""
         try:
-            self._renewal.adopt(diagnostics.adopted_values(msg))
+            self._renewal.adopt(estimates.adopted_arm(msg, self._renewal.arm))
         except FlatPlannerError as error:
             self._log.warning(f"the planner's model is not followed: {error}")
 
@@ -150,7 +150,7 @@ class TrackerNode(GuardedNode):
 
     def _on_health(self) -> None:
         """Say what the tracker does."""
-        self._renewal.adopt({})  # what has come while another one was made
+        self._renewal.adopt(None)  # what has come while another one was made
         refusal = self._renewal.take_refusal()
         if refusal:
             self._log.warning(refusal)

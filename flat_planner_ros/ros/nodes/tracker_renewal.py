@@ -14,9 +14,7 @@
 
 """A tracker for the model that the planner has adopted, made beside the executor."""
 
-from dataclasses import replace
 from threading import Thread
-from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, PlanarArm
 from flat_planner_ros.core.tracking import Tracker, TrackerSettings
@@ -24,7 +22,7 @@ from flat_planner_ros.core.tracking import Tracker, TrackerSettings
 
 class TrackerRenewal:
     """
-    Makes a tracker for another stiffness and damping, to take the place of the present one.
+    Makes a tracker for another model, to take the place of the present one.
 
     Its certificate takes half a second, in which the arm must not be let go: it is computed in a
     thread of its own.
@@ -42,16 +40,21 @@ class TrackerRenewal:
         self._arm, self._settings = arm, settings
         self._worker: Thread | None = None
         self._made: Tracker | None = None
-        self._wanted: dict[str, Any] = {}
+        self._is_wanted = False
         self._refusal = ''
 
-    def adopt(self, values: dict[str, float]) -> None:
-        """Take stiffness and damping [N m/rad, N m s/rad], if there are any."""
-        if values:
-            self._wanted = values
-        if self._wanted and (self._worker is None or not self._worker.is_alive()):
-            arm, self._wanted = replace(self._arm, **self._wanted), {}
-            self._worker = Thread(target=self._make, args=(arm,), daemon=True)
+    @property
+    def arm(self) -> PlanarArm:
+        """Return the model that was adopted last, the first one before."""
+        return self._arm
+
+    def adopt(self, arm: PlanarArm | None) -> None:
+        """Take another model, if there is one."""
+        if arm is not None:
+            self._arm, self._is_wanted = arm, True
+        if self._is_wanted and (self._worker is None or not self._worker.is_alive()):
+            self._is_wanted = False
+            self._worker = Thread(target=self._make, args=(self._arm,), daemon=True)
             self._worker.start()
 
     def take_refusal(self) -> str:

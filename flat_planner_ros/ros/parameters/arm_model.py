@@ -33,6 +33,8 @@ from flat_planner_ros.ros.parameters.row import (
     Row,
     Values,
 )
+import numpy as np
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 MODEL_ROWS = [
@@ -198,9 +200,37 @@ def model_defaults(overrides: Values) -> Values:
     return EXAMPLE_ARM
 
 
-def model_parameters(*, stiffness: float, damping: float) -> list[Parameter]:
-    """Return the parameters of the passive joint with new values [N m/rad], [N m s/rad]."""
-    return [
-        Parameter('model.stiffness', value=stiffness),
-        Parameter('model.damping', value=damping),
-    ]
+def model_parameters(node: Node, arm: PlanarArm, before: PlanarArm) -> list[Parameter]:
+    """
+    Return the parameters that make an arm of the one that a node has; its last two links differ.
+
+    Parameters
+    ----------
+    node
+        Its parameters say in which form the model is given.
+    arm, before
+        The arm wanted and the present one.
+
+    """
+    changed: dict[str, Any] = {'model.stiffness': arm.stiffness, 'model.damping': arm.damping}
+    if (arm.inertia != before.inertia).any():
+        if node.get_parameter_or('model.inertia_star').value is not None:
+            changed['model.inertia_star'] = list(arm.inertia_star)
+        else:
+            given = node.get_parameter('model.link_inertia').value
+            changed['model.link_inertia'] = changed_link_inertia(given, arm, before)
+    for kind in ('viscous', 'coulomb'):
+        friction = getattr(arm, f'{kind}_friction')
+        if (friction != getattr(before, f'{kind}_friction')).any():
+            changed[f'friction.{kind}'] = friction.tolist()
+    return [Parameter(name, value=value) for name, value in changed.items()]
+
+
+def changed_link_inertia(
+    link_inertia: Sequence[float], arm: PlanarArm, before: PlanarArm
+) -> list[float]:
+    """Return the full form's inertias [kg m^2]; what is more or less sits at the centres."""
+    inertia = np.array(link_inertia, dtype=float)
+    inertia[-2:] += np.diag(arm.inertia - before.inertia)[-2:]
+    changed: list[float] = inertia.tolist()
+    return changed

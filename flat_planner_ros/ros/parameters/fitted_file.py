@@ -20,8 +20,8 @@ from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, PlanarArm
 from flat_planner_ros.core.model_fit import ModelFit
+from flat_planner_ros.ros.parameters.arm_model import changed_link_inertia
 from flat_planner_ros.ros.parameters.yaml_reader import parsed
-import numpy as np
 import yaml
 
 DIGITS = 8
@@ -86,12 +86,10 @@ def _change(block: dict[str, Any], arm: PlanarArm, before: PlanarArm) -> None:
     if 'inertia_star' in model:
         model['inertia_star'] = _rounded(arm.inertia_star)
         return
-    # The full form: what is more or less sits at the links' own centres of mass.
-    inertia = np.array(model['link_inertia'], dtype=float)
-    inertia[-2:] += np.diag(arm.inertia - before.inertia)[-2:]
-    if inertia.min() < 0.0:
+    inertia = changed_link_inertia(model['link_inertia'], arm, before)
+    if min(inertia) < 0.0:
         raise UnwritableModel(
-            f'link_inertia would be {inertia.tolist()} kg m^2: the masses or centres of mass of '
+            f'link_inertia would be {inertia} kg m^2: the masses or centres of mass of '
             'the last two links are too large; give them by model.inertia_star instead'
         )
     model['link_inertia'] = _rounded(inertia)

@@ -87,6 +87,13 @@ ROWS = [
         'what the actuated joints do after a motion',
         'auto = seen from the samples',
     ),
+    Row(
+        'fit_model',
+        MonitorSettings.fits_model,
+        '',
+        'estimate inertias, spring, damper and friction of the last two links from each motion',
+        'needs measured efforts, and a second or two of the processor after each motion',
+    ),
 ]
 """All parameters of the monitor node."""
 
@@ -122,6 +129,8 @@ def build(values: Values) -> MonitorSettings:
         expected_damping_ratio=damping_ratio,
         arm=arm,
         actuated_joints=ActuatedJoints(values['actuated_joints']),
+        # A position drive has no say in the efforts: only ratios to the inertia I*_n are told.
+        fits_model=values['fit_model'] and Drive(values['drive']) is Drive.EFFORT,
     )
 
 

@@ -15,15 +15,15 @@
 """Verdicts and reports as diagnostic messages: a sentence for people, pairs for tools."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.core.arm import InvalidRequest
 from flat_planner_ros.core.insensitive import PredictedResidual
 from flat_planner_ros.core.monitor import (
-    ActuatedJoints,
-    Adoption,
+    LastLinks,
     Level,
-    ReportedEstimate,
+    ModelEstimate,
     StiffnessEstimate,
     VibrationReport,
 )
@@ -38,7 +38,6 @@ from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, 
 from flat_planner_ros.core.tracking import Certificate
 from flat_planner_ros.ros.wire.interfaces import (
     ERROR_CODES,
-    MODEL_NAME,
     REPORT_NAME,
     STATUS_NAME,
     TRACKER_NAME,
@@ -61,6 +60,16 @@ ENDINGS = {
     Outcome.FAILED: 'was not carried out',
 }
 """Half a sentence on each end of a motion."""
+
+MODEL_KEYS = {
+    'both': 'model.inertia_star.both',
+    'last': 'model.inertia_star.last',
+    'stiffness': 'model.stiffness',
+    'damping': 'model.damping',
+    'viscous': 'model.viscous_friction',
+    'coulomb': 'model.coulomb_friction',
+}
+"""Keys of `LastLinks` on the wire."""
 
 Values = Mapping[str, float | int | str | None]
 """Keys and values of a status; None for what is not known."""
@@ -193,81 +202,6 @@ def astray_status(astray: Astray) -> DiagnosticStatus:
     return status_msg(STATUS_NAME, DiagnosticStatus.WARN, message, values)
 
 
-def adopted_status(adoption: Adoption) -> DiagnosticStatus:
-    """Return the notice that the nominal model has changed."""
-    estimate, former, arm = adoption.estimate, adoption.former, adoption.arm
-    message = (
-        f'stiffness {former.stiffness:.6g} -> {arm.stiffness:.6g} N m/rad, damping '
-        f'{former.damping:.4g} -> {arm.damping:.4g} N m s/rad, estimated after the motion that '
-        f'started at {estimate.start_time:.3f} s'
-    )
-    values: Values = {
-        'state': 'ADOPTED',
-        'stiffness': arm.stiffness,
-        'stiffness_std': estimate.stiffness_std,
-        'stiffness_former': former.stiffness,
-        'damping': arm.damping,
-        'damping_std': estimate.damping_std,
-        'damping_former': former.damping,
-        'estimate_basis': estimate.case.value,
-        'start_time': f'{estimate.start_time:.9f}',
-    }
-    return status_msg(MODEL_NAME, DiagnosticStatus.OK, message, values)
-
-
-def reported_estimate(msg: DiagnosticArray) -> ReportedEstimate | None:
-    """
-    Return the estimate in a monitor's report, None if it has been withheld.
-
-    Raises
-    ------
-    InvalidRequest
-        The report has an estimate that cannot be read.
-
-    """
-    for status in msg.status:
-        values = {pair.key: pair.value for pair in status.values}
-        if status.name != REPORT_NAME or 'stiffness_estimate' not in values:
-            continue
-        try:
-            return ReportedEstimate(
-                start_time=float(values['start_time']),
-                joint=values['joint'],
-                stiffness=float(values['stiffness_estimate']),
-                stiffness_std=float(values['stiffness_std']),
-                damping=float(values['damping_estimate']),
-                damping_std=float(values['damping_std']),
-                case=ActuatedJoints(values['estimate_basis']),
-                inertia=float(values['estimate_inertia']),
-            )
-        except (KeyError, ValueError) as error:
-            raise InvalidRequest(f'estimate with missing or unreadable {error}') from error
-    return None
-
-
-def adopted_values(msg: DiagnosticArray) -> dict[str, float]:
-    """
-    Return stiffness and damping that a planner has adopted, nothing if the message is of goals.
-
-    Raises
-    ------
-    InvalidRequest
-        The values cannot be read.
-
-    """
-    adopted: dict[str, float] = {}
-    for status in msg.status:
-        if status.name == MODEL_NAME:
-            values = {pair.key: pair.value for pair in status.values}
-            try:
-                adopted = {name: float(values[name]) for name in ('stiffness', 'damping')}
-            except (KeyError, ValueError) as error:
-                raise InvalidRequest(
-                    f'adopted model with missing or unreadable {error}'
-                ) from error
-    return adopted
-
-
 def report_status(report: VibrationReport) -> DiagnosticStatus:
     """Return what a motion has left behind."""
     return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _report_values(report))
@@ -359,6 +293,7 @@ def _report_values(report: VibrationReport) -> Values:
         'fit_rms': report.fit.fit_rms,
         'clock_offset': report.clock_offset,
         **_estimate_values(report.estimate),
+        **_whole_values(report.model),
     }
 
 
@@ -385,6 +320,21 @@ def _shortfall_values(shortfall: Shortfall) -> Values:
         'value': shortfall.value,
         'limit': shortfall.limit,
     }
+
+
+def model_values(found: LastLinks, stds: LastLinks) -> Values:
+    """Return a whole model with the standard errors that are finite."""
+    values: dict[str, float | int | str | None] = {}
+    for key, value, std in zip(MODEL_KEYS.values(), found, stds, strict=True):
+        values |= {key: value, f'{key}_std': std if isfinite(std) else None}
+    return values
+
+
+def _whole_values(model: ModelEstimate | None) -> Values:
+    """Return a whole model that can be trusted, else nothing."""
+    if model is None or model.reason or model.values is None or model.stds is None:
+        return {}
+    return model_values(model.values, model.stds)
 
 
 def _residual_values(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:

@@ -48,13 +48,18 @@ class Tuned(Suite):
         super().__init__(graph, {**slow, **(planner or {})}, {**mismatch, **plant})
 
     def report(self, angle=pi):
-        """Move from the initial pose; return the values of the report."""
+        """Move from the initial pose to the goal; return the values of the report."""
+        report = self.report_on_attempt(angle)
+        assert self.outcomes()[-2:] == ['ACCEPTED', 'FINISHED']
+        return report
+
+    def report_on_attempt(self, angle=pi):
+        """Move from the initial pose, to the goal or not; return the values of the report."""
         self.graph.call(Trigger, '/flat_plant/reset')
         self.graph.expect(lambda: not any(self.states[-1].velocity), 'the reset')
         seen = len(self.states)
         self.graph.expect(lambda: len(self.states) >= seen + QUEUE, 'the reset at the planner')
         _, report = self.carry_out(angle)
-        assert self.outcomes()[-2:] == ['ACCEPTED', 'FINISHED']
         return report
 
     def outcomes(self):
@@ -146,6 +151,35 @@ def test_with_noise_and_without_being_asked(graph, scale):
     # What is left is noise, or at most so little that the estimate confirms the model.
     assert len(suite.adoptions()) == 1
     assert suite.model()[0] == float(first['stiffness_estimate'])
+
+
+def test_one_motion_tells_all_that_moves_the_last_links(graph):
+    scale, friction = 1.25, {'friction.viscous': [2e-4], 'friction.coulomb': [5e-4]}
+    tuned = {'auto_tune': True, 'compensate_friction': True, 'sampling.period': 0.005}
+    plant = {'mismatch.inertia_scale': scale, 'publish_rate': 200.0, 'real_time_factor': 0.5}
+    suite = Tuned(graph, scale, planner=tuned, **plant, **friction)
+    graph.set_parameters('flat_monitor', fit_model=True)
+    first = suite.report_on_attempt()
+    names = 'inertia_star.both', 'inertia_star.last', 'stiffness', 'damping'
+    for name, nominal in zip(names, (*INERTIA, STIFFNESS, DAMPING), strict=True):
+        assert float(first[f'model.{name}']) == pytest.approx(scale * nominal, rel=0.03), name
+        assert float(first[f'model.{name}_std']) > 0.0
+    assert float(first['model.coulomb_friction']) == pytest.approx(5e-4, rel=0.01)
+    graph.expect(suite.adoptions, 'the adoption')
+    own, followed = (
+        graph.get_parameters(
+            node, 'model.inertia_star', 'model.stiffness', 'friction.viscous', 'friction.coulomb'
+        )
+        for node in ('flat_planner', 'flat_monitor')
+    )
+    assert list(own[0]) == pytest.approx([scale * inertia for inertia in INERTIA], rel=0.03)
+    second = suite.report()
+    assert float(second['amplitude']) <= 0.02 * float(first['amplitude'])
+    miss = [abs(float(report['final_error.joint1'])) for report in (first, second)]
+    assert miss[1] <= 0.02 * miss[0]
+    assert [list(v) if hasattr(v, '__len__') else v for v in followed] == [
+        pytest.approx(list(v) if hasattr(v, '__len__') else v) for v in own
+    ]
 
 
 def test_below_the_noise_the_estimate_is_withheld(graph):
