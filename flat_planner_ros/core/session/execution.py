@@ -64,9 +64,9 @@ class Shortfall(NamedTuple):
     message
         A clause with the numbers.
     joint
-        The first that is off.
+        The first that is off; empty where it is the clock.
     value, limit
-        What was measured and what is allowed, [rad] or [rad/s].
+        What was measured and what is allowed, [rad] or [rad/s]; the jump of a clock [s], and 0.
 
     """
 
@@ -144,6 +144,12 @@ def check_carried_out(
             value=off.value,
             limit=off.limit,
         )
+
+
+def clock_fault(why: str, jump: float) -> Shortfall:
+    """Return why a motion has failed that was planned for the times of a clock that jumps [s]."""
+    message = f'{why}: nothing that was planned counts any more'
+    return Shortfall(Reason.CLOCK_JUMPED, message, '', jump, 0.0)
 
 
 class ExecutionWatch:

@@ -27,9 +27,11 @@ from flat_planner_ros.core.planning import (
     stop_plan,
 )
 from flat_planner_ros.core.session.caught_start import is_moving
+from flat_planner_ros.core.session.delivery import Delivery
 from flat_planner_ros.core.session.execution import (
     Astray,
     check_carried_out,
+    clock_fault,
     Ended,
     ExecutionWatch,
     Outcome,
@@ -82,6 +84,7 @@ class PlannerSession:
         self._motion: Motion | None = None
         self._ended: list[Ended] = []
         self._watch = ExecutionWatch()
+        self._delivery = Delivery()
         self._count = 0
         self._last_goal: Goal | None = None
 
@@ -110,13 +113,34 @@ class PlannerSession:
         """Return the last measured state, None before the first."""
         return self._recent.last
 
-    def measure(self, sample: JointSample) -> None:
-        """Take the measured state, in the order of the session's joints, unless it comes late."""
+    def measure(self, sample: JointSample, arrival: float | None = None) -> None:
+        """Take a measured state, in the order of the joints; its arrival [s] tells of delays."""
+        if arrival is not None:
+            self._delivery.hear(arrival - sample.time)
         last = self._recent.last
         age = 0.0 if last is None else last.time - sample.time
         # Far back is no late message, but a clock that was set back.
         if not 0.0 < age <= self.settings.joint_state_timeout:
             self._recent.add(sample)
+
+    @property
+    def lateness(self) -> str:
+        """Return why commands will come late, a clause; empty if they need not."""
+        return self._delivery.doubt(self.settings)
+
+    def drop(self, why: str, jump: float) -> int:
+        """
+        Give up all that is planned or measured: the clock has jumped, its times are past.
+
+        Returns the number of motions that fail by it; `why` is a clause, the jump in seconds.
+        """
+        last, fault = self._recent.last, clock_fault(why, jump)
+        failed = [Ended(m, Outcome.FAILED, fault) for m in self._timeline.motions if m.cut is None]
+        self._ended += self._watch.take_arrived(self.settings, self._timeline, last, inf)
+        self._ended += failed
+        self._timeline, self._motion = Timeline(), None
+        self._recent, self._watch, self._delivery = RecentStates(), ExecutionWatch(), Delivery()
+        return len(failed)
 
     def knows_start(self, now: float) -> bool:
         """Tell whether goals can be judged: there is a time [s], and a state where one counts."""
@@ -163,7 +187,7 @@ class PlannerSession:
             The settings allow no plan.
 
         """
-        settings = self.settings
+        settings = self._applied
         asked = checked_goal(goal, settings.joints)
         duration = settings.checked_duration(asked.duration)
         _check_time(now)
@@ -206,7 +230,7 @@ class PlannerSession:
 
         """
         _check_time(now)
-        settings, timeline = self.settings, self._timeline
+        settings, timeline = self._applied, self._timeline
         if not timeline.is_busy(now) and not is_moving(settings, timeline, self._recent):
             return None
         time = timeline.splice_time(now + settings.lookahead)
@@ -314,7 +338,7 @@ class PlannerSession:
         self, motion: Motion, start: MotionStart, stamp: float | None, clock: Clock | None
     ) -> Motion:
         """Return a motion with its place in time, which it takes unless planning took too long."""
-        settings = self.settings
+        settings = self._applied
         now = motion.planned_at if clock is None else clock()
         if start.running is None and start.jets is None:
             check_stamp(stamp, now)
@@ -357,8 +381,13 @@ class PlannerSession:
             else f'does anything publish on {self.source}?'
         )
         return motion_start(
-            self.settings, self._timeline, self._recent, self._last_pose, stamp, now, lack
+            self._applied, self._timeline, self._recent, self._last_pose, stamp, now, lack
         )
+
+    @property
+    def _applied(self) -> SessionSettings:
+        """Return the settings, with the delays that messages need where they are automatic."""
+        return self._delivery.applied(self.settings)
 
     @property
     def _last_pose(self) -> FloatArray | None:

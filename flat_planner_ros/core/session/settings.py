@@ -117,7 +117,8 @@ class SessionSettings:
     far_ahead
         Time to its start from which a goal's stamp looks as if it came by another clock [s].
     start_delay
-        From accepting a goal without a stamp to its start, at rest [s].
+        From accepting a goal without a stamp to its start, at rest [s]; 0 for as long as commands
+        need, judged by the age of joint states on arrival. The lookahead then is not shorter.
     lookahead
         From accepting a goal to its start while the arm moves, or another motion waits [s].
     replan_from

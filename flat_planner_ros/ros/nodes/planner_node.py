@@ -24,6 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import Goal, Motion, PlannerSession
+from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
 from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
@@ -78,6 +79,7 @@ class PlannerNode(GuardedNode):
         self._watch = GraphWatch(
             self, self._log, commands, [interfaces.JOINT_STATES], is_listening=True
         )
+        self._clocks = ClockWatch(self, self._session.drop, self._report_ended)
         self._apply(self._settings)
         load_early(self, PLANNING)
 
@@ -146,7 +148,7 @@ class PlannerNode(GuardedNode):
         """Keep the measured state for the next start."""
         try:
             for sample in self._reader.read(msg, self._now):
-                self._session.measure(sample)
+                self._session.measure(sample, self._now())
         except FlatPlannerError as error:
             self._watch.heard_other_part()
             self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
@@ -230,11 +232,16 @@ class PlannerNode(GuardedNode):
                 elapsed,
                 with_advice=self._settings.report_advice,
                 with_baselines=self._settings.report_baselines,
-                doubt=self._outlet.doubt(self._settings),
+                doubt=self._doubt(),
             )
         self._publish_status(status)
         self._report_ended()
         return status
+
+    def _doubt(self) -> str:
+        """Return why a command may not be played as planned, a clause; empty if it should be."""
+        lateness = self._session.lateness if self._settings.session.execute else ''
+        return '; '.join(filter(None, (self._outlet.doubt(self._settings), lateness)))
 
     def _publish_motion(self) -> None:
         """Publish all that is still to be carried out."""

@@ -184,6 +184,7 @@ ROWS = [
         SessionSettings.start_delay,
         's',
         'from accepting a goal without a stamp to the start of its motion',
+        '0 = automatic, by the age of joint states on arrival',
         lower=0.0,
     ),
     Row(

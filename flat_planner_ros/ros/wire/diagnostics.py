@@ -316,9 +316,9 @@ def _shortfall_values(shortfall: Shortfall) -> Values:
     return {
         'error_code': ERROR_CODES[shortfall.reason],
         'error_name': shortfall.reason.value,
-        'joint': shortfall.joint,
+        'joint': shortfall.joint or None,
         'value': shortfall.value,
-        'limit': shortfall.limit,
+        'limit': shortfall.limit if shortfall.joint else None,
     }
 
 

@@ -107,6 +107,7 @@ ERROR_CODES = {
     Reason.START_STATE_STALE: -121,
     Reason.START_STATE_MISMATCH: -122,
     Reason.NOT_AT_REST: -123,
+    Reason.CLOCK_JUMPED: -124,
     Reason.SOLVER_FAILED: -130,
     Reason.ILL_CONDITIONED: -131,
     Reason.BUSY: -140,
