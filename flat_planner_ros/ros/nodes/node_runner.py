@@ -25,13 +25,14 @@ from threading import Event
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.programs import SIGNALS
+from flat_planner_ros.ros.nodes.certain_end import certain_end
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import introduce
 from flat_planner_ros.version import version_line
 import rclpy
 from rclpy.exceptions import NotInitializedException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_default_context, remove_ros_args
 
@@ -64,7 +65,7 @@ SPIN_PERIOD = 0.1
 """Longest wait in the executor [s]; without one an EventsExecutor would never run a callback."""
 
 
-def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = None) -> int:
+def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | None = None) -> int:
     """
     Spin nodes in one process until it is interrupted.
 
@@ -82,14 +83,25 @@ def run(creators: Sequence[Callable[[], Node]], args: Sequence[str] | None = Non
         start with what it was given.
 
     """
-    nodes: list[Node] = []
+    nodes: list[GuardedNode] = []
     is_open = is_ready = False
-    with signals_caught() as interrupted:
+    executors: list[Executor] = []
+
+    def wake() -> None:
+        for executor in executors:
+            executor.wake()
+
+    def rest() -> None:
+        for node in nodes:
+            node.rest()
+
+    with signals_caught() as interrupted, certain_end(wake, rest):
         try:
             _refuse_strays(sys.argv if args is None else args)
             _init(args)
             is_open = True
             executor = _new_executor()
+            executors.append(executor)
             for create in creators:
                 if interrupted.is_set():
                     return 0

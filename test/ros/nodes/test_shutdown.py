@@ -75,6 +75,27 @@ sys.exit(run([Overtaken]))
 """
 
 
+STUCK = """
+import sys, time
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
+from flat_planner_ros.ros.nodes.node_runner import run
+
+class Stuck(GuardedNode):
+    def __init__(self):
+        super().__init__('stuck')
+        self.create_timer(0.01, self.on_tick)
+
+    def on_tick(self):
+        print('stuck', flush=True)
+        time.sleep(1000.0)  # goes on after a signal
+
+    def rest(self):
+        print('at rest', flush=True)
+
+sys.exit(run([Stuck]))
+"""
+
+
 def start(graph, name, *arguments):
     """Start a program as its console script does, and wait until it catches signals."""
     process = graph.run([sys.executable, '-c', CODE.format(name), *arguments])
@@ -160,6 +181,15 @@ def test_a_shutdown_of_the_context_ends_a_node(graph, delay):
 def test_a_callback_that_a_shutdown_overtakes_says_nothing(graph, executor):
     process = graph.run([sys.executable, '-c', OVERTAKEN], FLAT_PLANNER_EXECUTOR=executor)
     assert_clean(process)
+
+
+@pytest.mark.parametrize('executor', ['events', 'single'])
+def test_a_signal_ends_a_node_that_does_not_come_back(graph, executor):
+    process = graph.run([sys.executable, '-c', STUCK], FLAT_PLANNER_EXECUTOR=executor)
+    graph.expect(lambda: 'stuck' in process.stdout, 'a callback that lasts')
+    assert process.stop(signal.SIGTERM) == 1
+    assert 'ended by force, 5 s after SIGTERM' in process.stderr
+    assert 'at rest' in process.stdout
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
