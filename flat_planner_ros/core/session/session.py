@@ -129,11 +129,7 @@ class PlannerSession:
         return self._delivery.doubt(self.settings)
 
     def drop(self, why: str, jump: float) -> int:
-        """
-        Give up all that is planned or measured: the clock has jumped, its times are past.
-
-        Returns the number of motions that fail by it; `why` is a clause, the jump in seconds.
-        """
+        """Give up all that is planned: the clock has jumped [s]. Return how many motions fail."""
         last, fault = self._recent.last, clock_fault(why, jump)
         failed = [Ended(m, Outcome.FAILED, fault) for m in self._timeline.motions if m.cut is None]
         self._ended += self._watch.take_arrived(self.settings, self._timeline, last, inf)
