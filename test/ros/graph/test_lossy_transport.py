@@ -143,7 +143,8 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
         if not efforts.any():
             kinds.append('not played')
             refused = len(graph.logged(REFUSED)) - refusals
-            assert refused == len(lossy.relay.delivered)
+            # Of a kind there is one line a second, with a count.
+            assert bool(refused) == bool(lossy.relay.delivered)
         else:
             begun = int(np.argmax(efforts != 0.0))
             np.testing.assert_allclose(efforts[begun:], wanted[begun:], rtol=0.0, atol=1e-9)
