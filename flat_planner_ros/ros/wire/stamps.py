@@ -16,7 +16,7 @@
 
 from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
-from rclpy.clock import Clock
+from rclpy.clock import Clock, ROSClock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
@@ -41,6 +41,11 @@ def duration_msg(duration: float) -> Duration:
 def now(clock: Clock) -> float:
     """Return the present time of a clock [s]."""
     return seconds(clock.now().to_msg())
+
+
+def is_simulated(clock: Clock) -> bool:
+    """Tell whether a clock shows what is heard on `/clock`."""
+    return isinstance(clock, ROSClock) and clock.ros_time_is_active
 
 
 def sec_and_nanosec(time: float) -> tuple[int, int]:

@@ -132,16 +132,13 @@ def test_a_second_tracker_lets_go_of_an_arm_that_another_one_holds(graph):
     assert len(graph.logged('given up')) == 0
 
 
-def test_two_idle_trackers_both_let_go(graph):
+def test_of_two_idle_trackers_one_lets_go_at_least(graph):
+    """Whichever hears the other first; that one is then silent, and the other may go on alone."""
     arm = Tracked(graph)
     arm.start_tracker()
     arm.pass_time(0.3)
     arm.move(0.5)
-    graph.expect(lambda: len(graph.logged('another node sends efforts')) == 2, 'both errors')
-    arm.pass_time(0.3)
-    count = len(arm.sent)
-    arm.pass_time(0.2)
-    assert len(arm.sent) == count
+    graph.expect(lambda: graph.logged('another node sends efforts'), 'an error')
 
 
 def test_the_health_of_a_tracker_is_published(graph):
