@@ -22,6 +22,7 @@ from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.planning.tradeoff import residual_of_plan
+from mujoco_model import mujoco_model
 import numpy as np
 import pytest
 
@@ -30,41 +31,11 @@ mujoco = pytest.importorskip('mujoco')
 PERIOD = 0.005
 SUBSTEPS = 10
 
-MODEL = """
-<mujoco>
-  <compiler angle="radian"/>
-  <option timestep="{step}" gravity="0 0 0" integrator="RK4"/>
-  <worldbody>
-    <body>
-      <joint name="motor" axis="0 0 1"/>
-      <inertial pos="0 0 0" mass="0.1" diaginertia="{across} {across} {inner}"/>
-      <body>
-        <joint name="spring" axis="0 0 1" stiffness="{stiffness}" damping="{damping}"/>
-        <inertial pos="0 0 0" mass="0.1" diaginertia="{across} {across} {last}"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-"""
-Two balanced links are two rotors on one axis ((7) of docs/derivation.md).
-
-Their inertias about the other axes play no part.
-"""
-
 
 def played(samples, stiffness, damping):
     """Return the joint angles and velocities when a command has ended."""
-    both, last = ARM.inertia_star
-    text = MODEL.format(
-        step=PERIOD / SUBSTEPS,
-        inner=both - last,
-        last=last,
-        across=both,
-        stiffness=stiffness * ARM.stiffness,
-        damping=damping * ARM.damping,
-    )
-    compiled = mujoco.MjModel.from_xml_string(text)
+    arm = ARM.scaled(stiffness=stiffness, damping=damping)
+    compiled = mujoco.MjModel.from_xml_string(mujoco_model(arm, PERIOD / SUBSTEPS))
     data = mujoco.MjData(compiled)
     times, torque = samples.times, samples.driving_effort
     while data.time < times[-1] - 1e-9:

@@ -17,6 +17,7 @@
 from core.conftest import ARM
 from core.tracking.closed_loop import ClosedLoop, motion_of, samples_of, settling
 from flat_planner_ros.core.tracking import Phase, Tracker, TrackerSettings
+from mujoco_model import mujoco_model
 import numpy as np
 import pytest
 
@@ -25,39 +26,13 @@ mujoco = pytest.importorskip('mujoco')
 SUBSTEP = 2e-4
 """Integration step [s]."""
 
-MODEL = """
-<mujoco>
-  <compiler angle="radian"/>
-  <option timestep="{step}" gravity="0 0 0" integrator="RK4"/>
-  <worldbody>
-    <body>
-      <joint name="motor" axis="0 0 1"/>
-      <inertial pos="0 0 0" mass="0.1" diaginertia="{across} {across} {inner}"/>
-      <body>
-        <joint name="spring" axis="0 0 1" stiffness="{stiffness}" damping="{damping}"/>
-        <inertial pos="0 0 0" mass="0.1" diaginertia="{across} {across} {last}"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-"""Two balanced links are two rotors on one axis ((7) of docs/derivation.md)."""
-
 
 class MujocoArm:
     """What the loop needs of an arm."""
 
     def __init__(self, arm):
         """Stand still at zero."""
-        both, last = arm.inertia_star
-        text = MODEL.format(
-            step=SUBSTEP,
-            inner=both - last,
-            last=last,
-            across=both,
-            stiffness=arm.stiffness,
-            damping=arm.damping,
-        )
+        text = mujoco_model(arm, SUBSTEP)
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)
 
