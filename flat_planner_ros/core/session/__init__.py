@@ -14,7 +14,7 @@
 
 """Session: goals and measurements in, motions and verdicts out, in the order of time."""
 
-from flat_planner_ros.core.session.execution import Astray, Ended, Outcome, Shortfall
+from flat_planner_ros.core.session.execution import Astray, clock_fault, Ended, Outcome, Shortfall
 from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint
 from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import (
@@ -29,6 +29,7 @@ from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 __all__ = [
     'Astray',
     'check_point_count',
+    'clock_fault',
     'Ended',
     'Goal',
     'GoalPoint',

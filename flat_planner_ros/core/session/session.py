@@ -31,10 +31,10 @@ from flat_planner_ros.core.session.delivery import Delivery
 from flat_planner_ros.core.session.execution import (
     Astray,
     check_carried_out,
-    clock_fault,
     Ended,
     ExecutionWatch,
     Outcome,
+    Shortfall,
 )
 from flat_planner_ros.core.session.goal import checked_goal, Goal
 from flat_planner_ros.core.session.goal_plan import plan_of_goal, settling_plan
@@ -128,9 +128,9 @@ class PlannerSession:
         """Return why commands will come late, a clause; empty if they need not."""
         return self._delivery.doubt(self.settings)
 
-    def drop(self, why: str, jump: float) -> int:
-        """Give up all that is planned: the clock has jumped [s]. Return how many motions fail."""
-        last, fault = self._recent.last, clock_fault(why, jump)
+    def drop(self, fault: Shortfall) -> int:
+        """Give up all that is planned, and what is measured. Return how many motions fail."""
+        last = self._recent.last
         failed = [Ended(m, Outcome.FAILED, fault) for m in self._timeline.motions if m.cut is None]
         self._ended += self._watch.take_arrived(self.settings, self._timeline, last, inf)
         self._ended += failed

@@ -23,7 +23,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Reason, RequestRejected
-from flat_planner_ros.core.session import Goal, Motion, PlannerSession
+from flat_planner_ros.core.session import clock_fault, Goal, Motion, PlannerSession, Shortfall
 from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
 from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
@@ -79,7 +79,7 @@ class PlannerNode(GuardedNode):
         self._watch = GraphWatch(
             self, self._log, commands, [interfaces.JOINT_STATES], is_listening=True
         )
-        self._clocks = ClockWatch(self, self._session.drop, self._report_ended)
+        self._clocks = ClockWatch(self, self._on_jump, self._report_ended)
         self._apply(self._settings)
         load_early(self, PLANNING)
 
@@ -200,6 +200,10 @@ class PlannerNode(GuardedNode):
         if samples is not None:
             self._reference.publish(conversions.reference_msg(samples, self._joints, now))
 
+    def _on_jump(self, why: str, jump: float) -> None:
+        """Give up what was planned for other times."""
+        self._session.drop(clock_fault(why, jump))
+
     def _report_ended(self) -> None:
         """Publish how motions have ended."""
         for astray in self._session.take_astray():
@@ -210,18 +214,11 @@ class PlannerNode(GuardedNode):
 
     def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
         """Give a goal exactly one verdict; carry it out if it is accepted."""
-        goal = None
+        goal = motion = None
         started = perf_counter()
         try:
             goal = read()
             motion = self._session.submit(goal, self._now(), self._now)
-        except RequestRejected as error:
-            status = diagnostics.rejected_status(error, goal)
-        except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
-            self._log.error(f'internal error: {error!r}')
-            rejection = RequestRejected(Reason.INTERNAL, f'internal error: {error!r}')
-            status = diagnostics.rejected_status(rejection, goal)
-        else:
             elapsed = perf_counter() - started
             # The verdict's peaks take a while: the plant need not wait for them.
             self._publish_motion()
@@ -234,9 +231,23 @@ class PlannerNode(GuardedNode):
                 with_baselines=self._settings.report_baselines,
                 doubt=self._doubt(),
             )
+        except RequestRejected as error:
+            status = diagnostics.rejected_status(error, goal)
+        except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
+            status = self._internal_error(error, goal, motion)
         self._publish_status(status)
         self._report_ended()
         return status
+
+    def _internal_error(
+        self, error: Exception, goal: Goal | None, motion: Motion | None
+    ) -> DiagnosticStatus:
+        """Refuse a goal that could not be worked on; nobody may have heard of its motion."""
+        message = f'internal error: {error!r}'
+        self._log.error(message)
+        if motion is not None:
+            self._session.drop(Shortfall(Reason.INTERNAL, message, '', 0.0, 0.0))
+        return diagnostics.rejected_status(RequestRejected(Reason.INTERNAL, message), goal)
 
     def _doubt(self) -> str:
         """Return why a command may not be played as planned, a clause; empty if it should be."""

@@ -41,7 +41,10 @@ ZSTD = b'\x28\xb5\x2f\xfd'
 BLOCK = 1 << 20
 """Size of the pieces in which a file is decompressed [bytes]."""
 
-DAMAGES = (McapError, ZstdError, struct.error, ValueError, LookupError, MemoryError, EOFError)
+DAMAGES = (
+    *(McapError, ZstdError, struct.error, EOFError),
+    *(ValueError, LookupError, OverflowError, MemoryError),
+)
 """Errors of the libraries where a file is cut short or spoilt."""
 
 MESSAGES = (

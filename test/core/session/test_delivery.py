@@ -19,7 +19,7 @@ from dataclasses import replace
 from core.session.test_session import BACK, ended, GOAL, NOW, sample, session
 from flat_planner_ros.core.planning.request import Reason
 from flat_planner_ros.core.session.delivery import AUTO_MARGIN, AUTO_TRIPS
-from flat_planner_ros.core.session.execution import Outcome
+from flat_planner_ros.core.session.execution import clock_fault, Outcome
 import numpy as np
 import pytest
 
@@ -69,7 +69,7 @@ def test_a_clock_that_jumps_fails_what_is_under_way_and_what_waits():
     planner = session()
     first = planner.submit(GOAL, NOW)
     second = planner.submit(replace(BACK, stamp=first.end + 1.0), NOW + 0.2)
-    assert planner.drop('the clock was set back by 99.000 s', -99.0) == 2
+    assert planner.drop(clock_fault('the clock was set back by 99.000 s', -99.0)) == 2
     (one, other) = planner.take_ended(1.0)
     assert (one.motion, other.motion) == (first, second)
     assert one.outcome is other.outcome is Outcome.FAILED
@@ -84,7 +84,7 @@ def test_a_clock_that_jumps_fails_what_is_under_way_and_what_waits():
 def test_the_goal_after_a_jump_begins_from_what_is_measured_then():
     planner = session()
     planner.submit(GOAL, NOW)
-    planner.drop('the clock was set back by 99.000 s', -99.0)
+    planner.drop(clock_fault('the clock was set back by 99.000 s', -99.0))
     assert planner.measured is None
     planner.measure(sample(position=(0.8, 0.0), time=1.0))
     motion = planner.submit(GOAL, 1.0)
@@ -98,5 +98,5 @@ def test_a_jump_at_rest_fails_nothing():
     motion = planner.submit(GOAL, NOW)
     planner.measure(sample(position=(motion.samples.positions[-1]), time=motion.end + 0.1))
     assert ended(planner, motion.end + 0.1) == [(motion, Outcome.FINISHED)]
-    assert planner.drop('the clock was set back by 99.000 s', -99.0) == 0
+    assert planner.drop(clock_fault('the clock was set back by 99.000 s', -99.0)) == 0
     assert planner.take_ended(1.0) == []
