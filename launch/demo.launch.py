@@ -34,6 +34,9 @@ PACKAGE = 'flat_planner_ros'
 TRACKED = {'input': 'tracker', 'publish_rate': 500.0}
 """Parameters of a plant that a tracker moves."""
 
+SERVOS = {'drive': 'position'}
+"""Parameters of a plant that takes the positions of a planner that sends nothing else."""
+
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments that planner.launch.py has not, and start both."""
@@ -82,6 +85,8 @@ def _plant(context: LaunchContext) -> list[Node]:
     overlay = LaunchConfiguration('overlay_file').perform(context)
     files = [LaunchConfiguration('params_file'), *([overlay] if overlay else [])]
     is_tracked = LaunchConfiguration('tracker').perform(context) == 'true'
+    has_servos = LaunchConfiguration('command_interface').perform(context) == 'position'
+    chosen = {**(TRACKED if is_tracked else {}), **(SERVOS if has_servos else {})}
     use_sim_time = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
     return [
         Node(
@@ -91,7 +96,7 @@ def _plant(context: LaunchContext) -> list[Node]:
             namespace=LaunchConfiguration('namespace'),
             parameters=[
                 *(ParameterFile(file, allow_substs=True) for file in files),
-                {'publish_clock': use_sim_time, **(TRACKED if is_tracked else {})},
+                {'publish_clock': use_sim_time, **chosen},
             ],
             ros_arguments=['--log-level', LaunchConfiguration('log_level')],
             output='screen',

@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import Drive, FloatArray
 import numpy as np
 
 GOAL_ANGLE = np.pi
@@ -140,7 +140,7 @@ class Recording(NamedTuple):
     positions
         Positions of both joints, shape (m, 2) [rad].
     efforts
-        Efforts of joint 1, shape (m,) [N m].
+        Efforts that joint 1 was given or its servo needed, shape (m,) [N m].
 
     """
 
@@ -163,6 +163,8 @@ class Result(NamedTuple):
         Envelope of the residual oscillation of joint 2 at the end of the motion [rad].
     recording
         The motion.
+    drive
+        What moved joint 1.
 
     """
 
@@ -171,8 +173,11 @@ class Result(NamedTuple):
     rms_effort: float
     amplitude: float
     recording: Recording
+    drive: Drive = Drive.EFFORT
 
     @property
     def printed(self) -> tuple[float, float] | None:
         """Return the paper's RMS effort [N m] and amplitude [rad], None where it has none."""
+        if self.drive is Drive.POSITION:
+            return None
         return PRINTED.get((self.scenario.number, self.strategy))

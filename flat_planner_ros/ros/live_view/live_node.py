@@ -30,6 +30,7 @@ from flat_planner_ros.ros.live_view.page_settings import (
     choices,
     number_within,
     SETTINGS,
+    SHOWN,
 )
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
@@ -313,7 +314,7 @@ class LiveNode(GuardedNode):
 
     async def _ask(self, node: str) -> None:
         """Tell the parameters of a node."""
-        client, names = self._parameter_clients[node], SETTINGS[node]
+        client, names = self._parameter_clients[node], (*SETTINGS[node], SHOWN)
         values = (await client.get_parameters(list(names))).values
         known = dict(zip(names, map(parameter_value_to_python, values), strict=False))
         self.feed.put(f'settings of {node}', known)

@@ -31,6 +31,9 @@ SETTINGS = {
 }
 """Parameters that the page shows and sets."""
 
+SHOWN = 'drive'
+"""Parameter of these nodes that it shows only: it is chosen with the arm."""
+
 ROWS = {
     interfaces.PLANNER: {row.name: row for row in planner.ROWS},
     interfaces.PLANT: {row.name: row for row in plant.ROWS},

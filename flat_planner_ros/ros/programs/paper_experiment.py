@@ -21,7 +21,8 @@ from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import Drive, FloatArray
+from flat_planner_ros.core.monitor import PlannedMotion
 from flat_planner_ros.figures.paper_example import (
     DURATION,
     GOAL_ANGLE,
@@ -41,6 +42,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from scipy.integrate import trapezoid
+from scipy.interpolate import CubicSpline
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -62,6 +64,9 @@ ATTEMPTS = 4
 
 PLAYED_TOLERANCE = 1e-3
 """Largest difference of applied and planned effort in a valid run, relative to the peak [-]."""
+
+FOLLOWED_TOLERANCE = 1e-4
+"""The same for the angle of a joint with a servo; angles begin far more gently than efforts."""
 
 PASSING = (
     'BUSY',
@@ -107,13 +112,20 @@ class Experimenter(Node):
         Processes of the nodes; the experiment ends when one of them does.
     interrupted
         Ends it, too.
+    drive
+        With which the nodes were started.
 
     """
 
     def __init__(
-        self, speed: float, processes: Sequence[Popen[bytes]], interrupted: Event
+        self,
+        speed: float,
+        processes: Sequence[Popen[bytes]],
+        interrupted: Event,
+        drive: Drive = Drive.EFFORT,
     ) -> None:
         super().__init__('paper_table')
+        self._drive = drive
         self._lead = LEAD * max(speed, 1.0)
         self._processes = processes
         self._interrupted = interrupted
@@ -249,15 +261,13 @@ class Experimenter(Node):
         if 'amplitude' not in values:
             raise NotPlayed(f'no amplitude: {self._reports[0].status[0].message}')
         recording = _recording(self._states, start)
-        times, planned = _planned_efforts(self._plans[0])
-        # Compared where there are joint states: a busy machine loses some of them.
-        moving = (recording.times >= 0.0) & (recording.times <= DURATION)
-        expected = np.interp(recording.times[moving], times, planned)
-        error = np.abs(recording.efforts[moving] - expected)
-        if not moving.any() or error.max() > PLAYED_TOLERANCE * np.abs(planned).max():
+        motion = conversions.planned_motion_from_trajectory(self._plans[0])
+        if not _is_played(recording, motion, self._drive):
             raise NotPlayed('the command reached the plant after its start')
-        rms = float(np.sqrt(trapezoid(planned**2, times) / DURATION))
-        return Result(scenario, method.name, rms, float(values['amplitude']), recording)
+        planned = _of_joint_1(motion.efforts)
+        rms = float(np.sqrt(trapezoid(planned**2, motion.times) / DURATION))
+        amplitude = float(values['amplitude'])
+        return Result(scenario, method.name, rms, amplitude, recording, self._drive)
 
     def _accepted_start(self) -> float:
         """Send the goal until the planner has seen the reset; return the motion's start [s]."""
@@ -362,10 +372,20 @@ def _recording(states: Sequence[JointState], start: float) -> Recording:
     )
 
 
-def _planned_efforts(plan: JointTrajectory) -> tuple[FloatArray, FloatArray]:
-    """Return times [s] and efforts of joint 1 [N m]."""
-    motion = conversions.planned_motion_from_trajectory(plan)
-    return motion.times, _of_joint_1(motion.efforts)
+def _is_played(recording: Recording, motion: PlannedMotion, drive: Drive) -> bool:
+    """Return whether joint 1 was given what is planned, from the first point on."""
+    # Compared where there are joint states: a busy machine loses some of them.
+    moving = (recording.times >= 0.0) & (recording.times <= DURATION)
+    times = recording.times[moving]
+    if drive is Drive.POSITION:
+        # What a servo needs depends on the true arm; where it has to be does not.
+        wanted = CubicSpline(motion.times, motion.positions[:, 0])(times)
+        given, tolerance = recording.positions[moving, 0], FOLLOWED_TOLERANCE
+    else:
+        wanted = np.interp(times, motion.times, _of_joint_1(motion.efforts))
+        given, tolerance = recording.efforts[moving], PLAYED_TOLERANCE
+    peak = np.abs(wanted).max(initial=0.0)
+    return bool(peak > 0.0 and (np.abs(given - wanted) <= tolerance * peak).all())
 
 
 def _of_joint_1(efforts: FloatArray | None) -> FloatArray:

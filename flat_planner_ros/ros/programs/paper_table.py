@@ -27,6 +27,7 @@ import sys
 from threading import Event
 
 from flat_planner_ros.child_process import end_with_parent
+from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.figures.paper_example import BEYOND, CASES, Method, Result, Scenario
 from flat_planner_ros.programs import INTERRUPTED
 from flat_planner_ros.ros.dds_profile import profile_environment
@@ -101,6 +102,13 @@ Beyond the paper (docs/derivation.md, sections 3, 8.1 and I); scenario 4 is scen
   monitor has read from the oscillation after the first."""
 
 
+SERVO_REMARKS = """
+With servos, which the paper does not have (docs/derivation.md, I.7): joint 1 follows the planned
+angles whatever it takes, and the passive joint swings against a link that is held.
+- RMS effort: of the planned torque, which a servo needs if the arm is as modelled.
+- Amplitude: nothing on an arm as modelled without damping, or planned by the exact flat map."""
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """
     Run the experiment.
@@ -131,8 +139,9 @@ def main(args: Sequence[str] | None = None) -> int:
             os.environ.update(profile_environment(os.environ))  # for the nodes, too
             rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
             refuse_company(interrupted)
-            results = _results(speed, cases, interrupted)
-        print(REMARKS, file=summary, flush=True)
+            results = _results(speed, cases, interrupted, Drive(options.drive))
+        remarks = SERVO_REMARKS if options.drive == Drive.POSITION.value else REMARKS
+        print(remarks, file=summary, flush=True)
         if options.beyond:
             print(BEYOND_REMARKS, file=summary, flush=True)
         if options.csv is not None:
@@ -163,6 +172,12 @@ def _options(arguments: Sequence[str]) -> Namespace:
         'insensitive motions, and a second motion after self-tuning',
     )
     parser.add_argument(
+        '--drive',
+        choices=[drive.value for drive in Drive],
+        default=Drive.EFFORT.value,
+        help='what joint 1 is given in all three nodes: the paper gives an effort',
+    )
+    parser.add_argument(
         '--plot', metavar='FILE', type=figure_name, help='figures, .png, .pdf or .svg, or -'
     )
     parser.add_argument('--csv', metavar='FILE', help='the numbers, or -')
@@ -175,12 +190,12 @@ def _options(arguments: Sequence[str]) -> Namespace:
 
 
 def _results(
-    speed: float, cases: Sequence[tuple[Scenario, Method]], interrupted: Event
+    speed: float, cases: Sequence[tuple[Scenario, Method]], interrupted: Event, drive: Drive
 ) -> list[Result]:
     """Return the rows, printed as they come."""
     results = []
-    with _node_processes(speed) as processes:
-        experimenter = Experimenter(speed, processes, interrupted)
+    with _node_processes(speed, drive) as processes:
+        experimenter = Experimenter(speed, processes, interrupted, drive)
         try:
             print('starting the three nodes ...', flush=True)
             experimenter.wait_for_nodes()
@@ -194,7 +209,7 @@ def _results(
 
 
 @contextmanager
-def _node_processes(speed: float) -> Iterator[list[subprocess.Popen[bytes]]]:
+def _node_processes(speed: float, drive: Drive) -> Iterator[list[subprocess.Popen[bytes]]]:
     """Run planner, plant and monitor, the plant owning the time."""
     parameters = {
         'planner': {
@@ -217,7 +232,7 @@ def _node_processes(speed: float) -> Iterator[list[subprocess.Popen[bytes]]]:
         for node, values in parameters.items():
             module = f'flat_planner_ros.ros.nodes.{node}_node'
             command = [sys.executable, '-m', module, '--ros-args', '--log-level', 'fatal']
-            for name, value in values.items():
+            for name, value in {'drive': drive.value, **values}.items():
                 command += ['-p', f'{name}:={value}']
             # Its own session: Ctrl-C reaches this process alone, which ends the nodes in order.
             processes.append(

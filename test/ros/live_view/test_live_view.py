@@ -151,6 +151,7 @@ def test_a_goal_leaves_a_verdict_and_a_residual_on_the_page(graph):
 
     async def act(browser: Browser) -> None:
         await browser.expect(lambda: is_ready(browser), 'three nodes')
+        assert browser.values['settings of flat_plant']['drive'] == 'effort'
         reply = await browser.ask(
             do='set', node='flat_plant', values={'mismatch.stiffness_scale': 1.1}
         )

@@ -170,7 +170,7 @@ def test_the_demo_says_what_it_leaves_out_and_starts_the_rest(launched):
 def test_the_arguments_of_the_demo_reach_the_nodes(launched):
     arguments = (
         *('namespace:=left', 'use_sim_time:=true', 'log_level:=debug', 'scenario:=3'),
-        *('strategy:=polynomial', 'record:=true'),
+        *('strategy:=polynomial', 'record:=true', 'command_interface:=position'),
     )
     records = launched.run('demo.launch.py', *arguments, names=[*NODES, 'record'])
     for name, record in records.items():
@@ -179,6 +179,7 @@ def test_the_arguments_of_the_demo_reach_the_nodes(launched):
     assert parameters(records['flat_planner'])['strategy'] == 'polynomial'
     assert parameters(records['flat_planner'])['use_sim_time'] is True
     plant = parameters(records['flat_plant'])
+    assert plant['drive'] == parameters(records['flat_planner'])['drive'] == 'position'
     assert plant['publish_clock'] is True
     assert plant['mismatch'] == {
         'stiffness_scale': 1.1,

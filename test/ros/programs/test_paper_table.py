@@ -17,9 +17,12 @@
 import csv
 import signal
 
+from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.figures import paper_example
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
+import numpy as np
 import pytest
+from rclpy.parameter_client import AsyncParameterClient
 
 EXPECTED = {
     ('1', 'polynomial'): (0.008246, 0.0),
@@ -87,6 +90,15 @@ def test_the_paper_s_table_has_its_nine_rows_unless_more_is_asked_for():
     assert [(str(s.number), m.name) for s, m in paper_example.CASES] == list(EXPECTED)
 
 
+def test_the_paper_has_no_servos():
+    nothing = paper_example.Recording(np.zeros(0), np.zeros((0, 2)), np.zeros(0))
+    for drive in Drive:
+        result = paper_example.Result(
+            paper_example.SCENARIOS[1], 'polynomial', 0.008, 0.004, nothing, drive
+        )
+        assert (result.printed is None) is (drive is Drive.POSITION)
+
+
 def test_it_does_not_mix_with_nodes_that_already_run(graph):
     graph.create(PlannerNode)
     process = graph.start('paper_table')
@@ -95,15 +107,22 @@ def test_it_does_not_mix_with_nodes_that_already_run(graph):
     assert 'flat_planner already runs here' in process.stderr
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_leaves_no_node_behind(graph, number):
-    process = graph.start('paper_table')
+@pytest.mark.parametrize(
+    ('number', 'drive'), [(signal.SIGINT, 'effort'), (signal.SIGTERM, 'position')]
+)
+def test_an_interrupt_leaves_no_node_of_either_drive_behind(graph, number, drive):
+    process = graph.start('paper_table', '--drive', drive)
     ours = {'flat_planner', 'flat_plant', 'flat_monitor'}
 
     def present() -> set[str]:
         return ours & set(graph.probe.get_node_names())
 
     graph.expect(lambda: present() == ours, 'the three nodes')
+    client = AsyncParameterClient(graph.probe, 'flat_plant')
+    graph.expect(client.services_are_ready, 'the parameters of the plant')
+    answer = client.get_parameters(['drive'])
+    graph.expect(answer.done, 'its drive')
+    assert answer.result().values[0].string_value == drive
     assert process.stop(number) == 130
     assert 'Traceback' not in process.stderr
     graph.expect(lambda: not present(), 'the end of the three nodes')

@@ -114,9 +114,17 @@ const show = {
       element('dd', `${precise(value, 4)} ${unit}` + (expected === undefined ? '' : ` (model ${precise(expected, 4)})`)),
     ]));
   },
-  'settings of flat_planner'(values) { fill('flat_planner', values); },
-  'settings of flat_plant'(values) { fill('flat_plant', values); },
+  'settings of flat_planner'(values) { fill('flat_planner', values); tellDrive(); },
+  'settings of flat_plant'(values) { fill('flat_plant', values); tellDrive(); },
 };
+
+// What the planner plans for, and whether the plant is driven so.
+function tellDrive() {
+  const [planned, played] = ['flat_planner', 'flat_plant'].map(node => state.values[`settings of ${node}`]?.drive);
+  const differs = planned && played && planned !== played;
+  $('drive').textContent = (planned ? `drive: ${planned}` : '') + (differs ? `, that of the plant: ${played}` : '');
+  $('drive').classList.toggle('error', Boolean(differs));
+}
 
 // What the last accepted motion is predicted to leave, beside the button that asked for it.
 function predict(verdict) {
