@@ -23,9 +23,10 @@ the eleventh at both ends, since neighbours share the conditions there ((V4)).
 """
 
 from cmath import exp
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
@@ -326,3 +327,17 @@ def _ends(block: Block, places: FloatArray) -> list[FloatArray]:
     """Return derivatives 0 to 11 of a block's solutions at distances from their origin."""
     series = _ALONE[: len(block.columns)] if block.series is None else block.series
     return [ends.real for ends in _derivatives(block.rate, series, places, SOLUTIONS - 1)]
+
+
+def row_factors(rates: Sequence[float]) -> FloatArray:
+    """
+    Return factors of the conditions after which each solution is largest in its own one.
+
+    The k-th derivative of a solution grows like its rate to the power k. With rates b in ascending
+    order and factors e_k / e_(k-1) = 1 / sqrt(b_(k-1) b_k), entry e_k b_i^k is largest at k = i:
+    fast solutions meet the high derivatives and slow ones the low, whatever their rates.
+    """
+    factors = [1.0]
+    for slow, fast in pairwise(rates):
+        factors.append(factors[-1] / (slow * fast) ** 0.5)
+    return np.array(factors)

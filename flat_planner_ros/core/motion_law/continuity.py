@@ -27,7 +27,7 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law.basis import CONDITIONS, SegmentBasis, SOLUTIONS
+from flat_planner_ros.core.motion_law.basis import CONDITIONS, row_factors, SegmentBasis, SOLUTIONS
 import numpy as np
 
 RESIDUAL_STEPS = 3
@@ -83,8 +83,8 @@ class ContinuitySystem:
         at_start = np.array([basis.at_start for basis in bases]) * powers[:, :, None]
         at_end = np.array([basis.at_end for basis in bases]) * powers[:, :, None]
         rates = np.array([basis.rates for basis in bases]) / halves[:, None]
-        self._start_factors = _end_factors(rates[0])
-        self._end_factors = _end_factors(rates[-1])
+        self._start_factors = row_factors(rates[0].tolist())
+        self._end_factors = row_factors(rates[-1].tolist())
         # The faster segment's rates: only it can fulfil the conditions on high derivatives.
         self._knot_factors = _knot_factors(np.maximum(rates[:-1], rates[1:]))
         start = at_start[0, :CONDITIONS] * self._start_factors[:, None]
@@ -191,15 +191,9 @@ def _fill_knots(half: FloatArray, table: FloatArray, relaxation: float, row: int
     half[:, -1] = table[:, -2] + relaxation * table[:, -1]
 
 
-def _end_factors(rates: FloatArray) -> FloatArray:
-    """Return factors of derivatives 0 to 5 after which the i-th solution is largest in row i."""
-    steps = 1.0 / np.sqrt(rates[:-1] * rates[1:])
-    return np.concatenate([[1.0], np.cumprod(steps)])
-
-
 def _knot_factors(rates: FloatArray) -> FloatArray:
     """
-    Return factors of the conditions at knots, as `_end_factors` for two solutions of each rate.
+    Return factors of the conditions at knots, as `row_factors` for two solutions of each rate.
 
     Slow solutions of the two segments meet the values, and the pair of the i-th rate the
     derivatives 2 i - 3 and 2 i - 2 ((V6) of docs/derivation.md).

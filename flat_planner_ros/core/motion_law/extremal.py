@@ -30,11 +30,16 @@ multiples.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law.basis import ALTERNATING, block_of, combined, CONDITIONS
+from flat_planner_ros.core.motion_law.basis import (
+    ALTERNATING,
+    block_of,
+    combined,
+    CONDITIONS,
+    row_factors,
+)
 from flat_planner_ros.core.motion_law.law import ExponentialLaw, half_quadrature, JET_ORDER
 from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
 from flat_planner_ros.core.motion_law.terms import Term
@@ -188,7 +193,7 @@ class _BoundarySolver:
         self._parity = parity
         self._blocks = [block_of(cluster, parity) for cluster in ordered]
         columns = [column for block in self._blocks for column in block.columns]
-        self._rows = _row_factors([b.growth for b in self._blocks for _ in b.columns])
+        self._rows = row_factors([b.growth for b in self._blocks for _ in b.columns])
         self._matrix = (self._rows * np.array(columns)).T
         try:
             self._inverse = np.linalg.inv(self._matrix)
@@ -207,20 +212,6 @@ class _BoundarySolver:
             if term.origin != 0:  # else it is symmetric by itself
                 terms.append(term.mirrored(self._parity))
         return terms
-
-
-def _row_factors(rates: Sequence[float]) -> FloatArray:
-    """
-    Return factors of the conditions after which each solution is largest in its own one.
-
-    The k-th derivative of a solution grows like its rate to the power k. With rates b in ascending
-    order and factors e_k / e_(k-1) = 1 / sqrt(b_(k-1) b_k), entry e_k b_i^k is largest at k = i:
-    fast solutions meet the high derivatives and slow ones the low, whatever their rates.
-    """
-    factors = [1.0]
-    for slow, fast in pairwise(rates):
-        factors.append(factors[-1] / (slow * fast) ** 0.5)
-    return np.array(factors)
 
 
 class Mean(NamedTuple):
