@@ -51,6 +51,7 @@ test: lint  ## ruff, mypy and all tests
 	$(BIN)/python -c '$(PYTEST)' -n 2 --dist loadfile --timeout=300 $(ARGS)
 
 fuzz: export FUZZ_CASES ?= 100000
+fuzz: export TRUTH_CASES ?= 1000
 fuzz: export RANDOM_MESSAGES ?= 10000
 fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
 	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/wire/test_random_messages.py $(ARGS)

@@ -19,10 +19,14 @@ import os
 import pytest
 from truth import truth
 
-CASES = int(os.environ.get('TRUTH_CASES', '1000'))
+CASES = int(os.environ.get('TRUTH_CASES', '50'))
+
+FIRST = 100
+"""First case: those before are the suite's own (`test/core/insensitive/test_truth.py`)."""
 
 
 @pytest.mark.timeout(0)
 def test_what_is_predicted_is_what_is_simulated():
-    untold = [found for found in map(truth, range(CASES)) if not found.is_told]
+    cases = range(FIRST, FIRST + CASES)
+    untold = [found for found in map(truth, cases) if not found.is_told]
     assert not untold
