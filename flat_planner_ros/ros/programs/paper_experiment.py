@@ -68,6 +68,9 @@ PLAYED_TOLERANCE = 1e-3
 FOLLOWED_TOLERANCE = 1e-4
 """The same for the angle of a joint with a servo; angles begin far more gently than efforts."""
 
+NO_SWING = 1e-6
+"""Half a swing that counts as the amplitude where there is no oscillation to fit [rad]."""
+
 PASSING = (
     'BUSY',
     'NOT_AT_REST',
@@ -258,7 +261,9 @@ class Experimenter(Node):
         if not self._spin_until(lambda: bool(self._plans and self._reports), REPORT_PATIENCE):
             raise NotPlayed(f'no report of the motion at {start:.3f} s')
         values = {pair.key: pair.value for pair in self._reports[0].status[0].values}
-        if 'amplitude' not in values:
+        # A swing that is too small to be told from rounding has no amplitude of its own.
+        swing = 0.5 * float(values.get('peak_to_peak', 'inf'))
+        if 'amplitude' not in values and not swing < NO_SWING:
             raise NotPlayed(f'no amplitude: {self._reports[0].status[0].message}')
         recording = _recording(self._states, start)
         motion = conversions.planned_motion_from_trajectory(self._plans[0])
@@ -266,7 +271,7 @@ class Experimenter(Node):
             raise NotPlayed('the command reached the plant after its start')
         planned = _of_joint_1(motion.efforts)
         rms = float(np.sqrt(trapezoid(planned**2, motion.times) / DURATION))
-        amplitude = float(values['amplitude'])
+        amplitude = float(values.get('amplitude', swing))
         return Result(scenario, method.name, rms, amplitude, recording, self._drive)
 
     def _accepted_start(self) -> float:
