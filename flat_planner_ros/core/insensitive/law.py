@@ -265,12 +265,14 @@ def _motion(problem: Trade, found: Compromise) -> InsensitiveMotion:
     (law,) = responses(fourth[:, None], second[:, None], equation, problem.duration, course.start)
     is_exact = problem.wanted.nominal is Nominal.EXACT
     miss = largest_miss(law, second, equation, course.start, course.end, rests_at_end=is_exact)
-    passed = np.append(flat_outputs(law, equation, course.places) - course.values, 0.0)
-    size = np.abs(np.append(course.values, course.start[0])).max()
+    if len(course.places):
+        passed = np.abs(flat_outputs(law, equation, course.places) - course.values).max()
+        size = np.abs(np.append(course.values, course.start[0])).max()
+        miss = max(miss, float(passed / (size or 1.0)))
     return InsensitiveMotion(
         law=law,
         cost=found.cost,
-        boundary_residual=max(miss, float(np.abs(passed).max() / (size or 1.0))),
+        boundary_residual=miss,
         optimality_residual=found.stationarity,
     )
 

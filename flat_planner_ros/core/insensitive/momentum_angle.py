@@ -27,7 +27,7 @@ from functools import lru_cache
 from math import ceil, sqrt
 
 from flat_planner_ros.core.arm import Drive, FloatArray, locked, PlanarArm
-from flat_planner_ros.core.insensitive.oscillator import Oscillator
+from flat_planner_ros.core.insensitive.oscillator import gauss_legendre, Oscillator
 from flat_planner_ros.core.insensitive.response import (
     BASES_KEPT,
     CONTACT,
@@ -242,7 +242,7 @@ def _efforts_of_servo(
     columns = (slice(0, 1), start), (slice(1, None), still)
     if equation.is_split(len(fourths)):
         count = min(len(seconds) + ceil(equation.epsilon**-0.5), MAX_NODES)
-        nodes, weights = legendre.leggauss(count)
+        nodes, weights = gauss_legendre(count)
         distances = np.array([1.0 + nodes, 1.0 - nodes])
         quiet = legendre.legval(nodes, seconds).T
         laws = [

@@ -21,9 +21,17 @@ whose boundary holds the worst arm ((I1) and I.1 of docs/derivation.md).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil
 
-from flat_planner_ros.core.arm import ComplexArray, Drive, FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import (
+    ComplexArray,
+    Drive,
+    FloatArray,
+    InvalidRequest,
+    locked,
+    PlanarArm,
+)
 from flat_planner_ros.core.insensitive.insensitivity import UncertaintyBox
 import numpy as np
 from numpy.polynomial import legendre
@@ -47,6 +55,23 @@ MEAN_NODES = 4
 
 MAX_MEAN_NODES = (24, 24, 8)
 """Most of them over stiffness, damping and inertia, which acts like both others together."""
+
+
+RULES_KEPT = 128
+"""Quadratures, and points of an edge, that are remembered."""
+
+
+@lru_cache(maxsize=RULES_KEPT)
+def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights of a quadrature from -1 to 1."""
+    nodes, weights = legendre.leggauss(count)
+    return locked(nodes), locked(weights)
+
+
+@lru_cache(maxsize=RULES_KEPT)
+def _spread(count: int) -> FloatArray:
+    """Return Chebyshev points from 0 to 1: extremes near ends are seen as well as those inside."""
+    return locked(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,14 +195,15 @@ class Oscillator:
                 [k.low, c.high, i.high],
             ]
         )
+        ends = np.roll(corners, -1, axis=0)
+        poles = self.poles(corners)
+        turns = duration * np.abs(np.roll(poles, -1) - poles)
         edges = []
-        for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        for begin, end, turn in zip(corners, ends, turns.tolist(), strict=True):
             if (begin == end).all():
                 continue
-            turn = self._turn(begin, end, duration)
             count = min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most)
-            # Chebyshev points: extremes near corners are seen as well as those inside.
-            share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+            share = _spread(count)
             edge = begin + share[:, None] * (end - begin)
             # Frequencies go with the root of 1 / inertia, over which points are spread evenly.
             edge[:, 2] = 1.0 / (1.0 / begin[2] + share * (1.0 / end[2] - 1.0 / begin[2]))
@@ -193,7 +219,7 @@ class Oscillator:
             begin[axis] = low
             end[axis] = high
             count = MEAN_NODES + ceil(self._turn(begin, end, duration)) if low < high else 1
-            places, shares = legendre.leggauss(min(count, MAX_MEAN_NODES[axis]))
+            places, shares = gauss_legendre(min(count, MAX_MEAN_NODES[axis]))
             points = np.repeat(points, len(places), axis=0)
             points[:, axis] += np.tile(0.5 * (high - low) * places, len(weights))
             weights = np.multiply.outer(weights, 0.5 * shares).ravel()

@@ -108,6 +108,18 @@ def differentiation(size: int) -> FloatArray:
     return locked(matrix)
 
 
+@cache
+def _probes() -> FloatArray:
+    """Return the places x at which a law is certified."""
+    return locked(np.linspace(-1.0, 1.0, PROBES))
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def _at_probes(size: int) -> FloatArray:
+    """Return Legendre polynomials there, shape (PROBES, size)."""
+    return locked(np.asarray(legendre.legvander(_probes(), size - 1), dtype=float))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SeriesLaw(ScaledLaw):
     """
@@ -137,10 +149,18 @@ class SeriesLaw(ScaledLaw):
                 higher[row, : len(derivative)] = derivative
             table = np.concatenate([table, higher])
         result: FloatArray = table @ legendre.legvander(x, table.shape[1] - 1).T
+        return self._with_oscillation(result, x)
+
+    def probed(self) -> FloatArray:
+        """Return derivatives 0 to 6 in x at the times at which it is certified, shape (7, m)."""
+        return self._with_oscillation(self.table @ _at_probes(self.table.shape[1]).T, _probes())
+
+    def _with_oscillation(self, jet: FloatArray, x: FloatArray) -> FloatArray:
+        """Return the derivatives of the series at some x with those of the oscillation added."""
         if self.amplitude:
-            powers = self.amplitude * self.rate ** np.arange(order + 1)
-            result += np.multiply.outer(powers, np.exp(self.rate * (x + 1.0))).real
-        return result
+            powers = self.amplitude * self.rate ** np.arange(len(jet))
+            jet += np.multiply.outer(powers, np.exp(self.rate * (x + 1.0))).real
+        return jet
 
 
 def responses(
@@ -272,8 +292,7 @@ def largest_miss(
     rests_at_end: bool,
 ) -> float:
     """Return the largest miss at the ends, and of sigma'' in between, relative to peaks."""
-    nodes = np.linspace(-1.0, 1.0, PROBES)
-    jet = law.normalised_jet(np.array([1.0 + nodes, 1.0 - nodes]), JET_ORDER)[:JET_ORDER]
+    jet = law.probed()[:JET_ORDER]
     # Sigma may be far smaller than its terms: an arm that coasts has none.
     sizes = np.abs(jet).max(axis=1)
     terms = equation.momentum_angle(sizes)
@@ -281,7 +300,7 @@ def largest_miss(
     rest = np.zeros(JET_ORDER)
     rest[0] = end
     misses = [
-        _relative(np.abs(sigma[2] - legendre.legval(nodes, second)).max(), terms[2]),
+        _relative(np.abs(sigma[2] - _at_probes(len(second)) @ second).max(), terms[2]),
         _relative(jet[:, 0] - start, sizes),
         _relative(sigma[:, -1] - rest[: len(sigma)], terms),
     ]
