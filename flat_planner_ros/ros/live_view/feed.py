@@ -22,11 +22,17 @@ from math import isfinite
 from threading import Lock
 from typing import Any
 
-HISTORY = 3000
-"""Rows of a stream that are kept, 30 s at 100 Hz [-]."""
+HISTORY = 12000
+"""Rows of a stream that are kept, two minutes at 100 Hz [-]."""
+
+PORTION = 1500
+"""Most rows of a stream in one message, so that a past is told without a pause in the present."""
 
 DIGITS = 7
-"""Significant digits of a number on the page; times count from a near origin [-]."""
+"""Significant digits of a number on the page [-]."""
+
+TIME_DECIMALS = 4
+"""Decimals of a row's time [s], which counts from an origin that may be days ago [-]."""
 
 
 @dataclass
@@ -63,8 +69,10 @@ class Feed:
                 self._values[name] = version + 1, value
 
     def append(self, stream: str, row: Sequence[float]) -> None:
-        """Add a row to a stream; undefined numbers become null."""
-        numbers = [float(f'{x:.{DIGITS}g}') if isfinite(x) else None for x in row]
+        """Add a row to a stream, its time first; undefined numbers become null."""
+        time, *others = row
+        numbers = [_rounded(time, TIME_DECIMALS, 'f')]
+        numbers += [_rounded(x, DIGITS, 'g') for x in others]
         with self._lock:
             self._streams[stream].append(numbers)
 
@@ -100,8 +108,7 @@ class Feed:
                 news['values'] = values
             streams = {}
             for name, stream in self._streams.items():
-                rows = stream.after(cursor.rows.get(name, 0))
-                cursor.rows[name] = stream.count
+                rows, cursor.rows[name] = stream.after(cursor.rows.get(name, 0))
                 if rows:
                     streams[name] = rows
             if streams:
@@ -121,7 +128,14 @@ class _Stream:
         self.rows.append(row)
         self.count += 1
 
-    def after(self, count: int) -> list[list[float | None]]:
-        """Return the rows that came after the first `count`, as far as they are kept."""
-        new = min(self.count - count, len(self.rows))
-        return list(islice(self.rows, len(self.rows) - new, None)) if new > 0 else []
+    def after(self, count: int) -> tuple[list[list[float | None]], int]:
+        """Return the first rows that are kept after the first `count`, and how many those make."""
+        forgotten = self.count - len(self.rows)
+        first = max(count, forgotten) - forgotten
+        rows = list(islice(self.rows, first, first + PORTION))
+        return rows, forgotten + first + len(rows)
+
+
+def _rounded(x: float, digits: int, form: str) -> float | None:
+    """Return a number as short as the page needs it."""
+    return float(f'{x:.{digits}{form}}') if isfinite(x) else None

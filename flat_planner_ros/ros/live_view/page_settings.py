@@ -14,25 +14,67 @@
 
 """Parameters on the page of the live view: which, what they may be, and values from a browser."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.ros.parameters import planner, plant
-from flat_planner_ros.ros.parameters.row import InvalidParameter
+from flat_planner_ros.ros.parameters.row import InvalidParameter, Row
 from flat_planner_ros.ros.wire import interfaces
+from rclpy.parameter import Parameter
 
 SETTINGS = {
-    interfaces.PLANNER: ('strategy', 'flat_model', 'weights.r', 'weights.p', 'auto_tune'),
+    interfaces.PLANNER: (
+        'strategy',
+        'flat_model',
+        'weights.r',
+        'weights.p',
+        'insensitivity.stiffness',
+        'insensitivity.damping',
+        'insensitivity.inertia',
+        'insensitivity.nominal',
+        'insensitivity.criterion',
+        'insensitivity.weight',
+        'insensitivity.max_effort_rms',
+        'insensitivity.max_residual',
+        'peak.insensitive',
+        'duration.factor',
+        'replan.from',
+        'auto_tune',
+    ),
     interfaces.PLANT: (
         'mismatch.stiffness_scale',
         'mismatch.damping_scale',
         'mismatch.inertia_scale',
+        'mismatch.imbalance',
+        'noise.position_std',
+        'encoder.resolution',
     ),
 }
 """Parameters that the page shows and sets."""
 
-SHOWN = 'drive'
-"""Parameter of these nodes that it shows only: it is chosen with the arm."""
+SHOWN = {
+    interfaces.PLANNER: ('drive',),
+    interfaces.PLANT: ('drive', 'model.inertia_star'),
+}
+"""Parameters of these nodes that it reads only: they are chosen with the arm."""
+
+_OF_INSENSITIVE = {'strategy': [Strategy.INSENSITIVE.value]}
+
+WHEN: dict[str, dict[str, list[Any]]] = {
+    'weights.r': {'strategy': [Strategy.MIN_CONTROL_EFFORT.value, Strategy.MIXED.value]},
+    'weights.p': {'strategy': [Strategy.MIN_POTENTIAL_ENERGY.value, Strategy.MIXED.value]},
+    'insensitivity.nominal': _OF_INSENSITIVE,
+    'insensitivity.criterion': _OF_INSENSITIVE,
+    'insensitivity.weight': _OF_INSENSITIVE,
+    'insensitivity.max_effort_rms': _OF_INSENSITIVE,
+    'insensitivity.max_residual': _OF_INSENSITIVE,
+    'peak.insensitive': {'strategy': [Strategy.MIN_PEAK_EFFORT.value]},
+    # The reduced form of the model does not know the masses that could be out of balance.
+    'mismatch.imbalance': {'model.inertia_star': [None]},
+}
+"""Values of another parameter of the node with which a parameter matters; the others always do."""
 
 ROWS = {
     interfaces.PLANNER: {row.name: row for row in planner.ROWS},
@@ -40,21 +82,36 @@ ROWS = {
 }
 """Rows of these parameters and of all others, by node and name."""
 
+KINDS = {
+    Parameter.Type.BOOL: 'truth',
+    Parameter.Type.DOUBLE: 'number',
+    Parameter.Type.DOUBLE_ARRAY: 'numbers',
+    Parameter.Type.STRING: 'text',
+}
+"""What the page calls the types of parameters."""
+
+MAX_NUMBERS = 64
+"""Longest array from a browser [-]."""
+
 
 def choices() -> dict[str, dict[str, Any]]:
     """Return what the page needs to know of the parameters that it sets."""
-    shown = {}
-    for node, names in SETTINGS.items():
-        shown[node] = {
-            name: {
-                'description': ROWS[node][name].description,
-                'allowed': ROWS[node][name].constraints,
-                'choices': list(ROWS[node][name].choices),
-                'kind': type(ROWS[node][name].default).__name__,
-            }
-            for name in names
-        }
-    return shown
+    return {
+        node: {name: _choice(ROWS[node][name]) for name in names}
+        for node, names in SETTINGS.items()
+    }
+
+
+def _choice(row: Row) -> dict[str, Any]:
+    """Return what the page needs to know of a parameter."""
+    return {
+        'description': row.description,
+        'allowed': row.constraints,
+        'choices': list(row.choices),
+        'kind': KINDS[row.type],
+        'unit': row.unit.replace('-', ''),
+        'when': WHEN.get(row.name, {}),
+    }
 
 
 def checked_value(node: str, name: str, value: Any) -> Any:
@@ -68,11 +125,21 @@ def checked_value(node: str, name: str, value: Any) -> Any:
 
     """
     row = ROWS[node][name]
-    if isinstance(row.default, float):
+    kind = KINDS[row.type]
+    if kind == 'number':
         value = number_within(value, name)
+    elif kind == 'numbers':
+        value = [number_within(entry, name) for entry in list_within(value, name, MAX_NUMBERS)]
     elif type(value) is not type(row.default):
         raise InvalidParameter(f'{name} must be a {type(row.default).__name__}')
     row.check(value)
+    return value
+
+
+def list_within(value: Any, name: str, most: int) -> Sequence[Any]:
+    """Return a list from a browser that is not too long."""
+    if not isinstance(value, list) or len(value) > most:
+        raise InvalidRequest(f'{name} must be a list of at most {most}')
     return value
 
 

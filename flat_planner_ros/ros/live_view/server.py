@@ -20,6 +20,7 @@ from contextlib import suppress
 from importlib.resources import files
 from ipaddress import ip_address
 import json
+from pathlib import PurePath
 import socket
 from threading import Thread
 from typing import Any
@@ -40,13 +41,10 @@ MAX_COMMAND = 16 * 1024
 PATIENCE = 10.0
 """Silence after which a browser is taken for gone [s]."""
 
-PAGES = {
-    '/': ('index.html', 'text/html'),
-    '/live.css': ('live.css', 'text/css'),
-    '/live.js': ('live.js', 'text/javascript'),
-    '/plots.js': ('plots.js', 'text/javascript'),
-    '/words.js': ('words.js', 'text/javascript'),
-}
+START_PAGE = 'index.html'
+
+KINDS = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript'}
+"""Kinds of the page's files by the ends of their names."""
 
 HEADERS = {
     'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; "
@@ -84,9 +82,11 @@ def application(feed: Feed, obey: Obey, hosts: Collection[str] = ()) -> web.Appl
     """
     app = web.Application(middlewares=[_guard])
     app[FEED], app[OBEY], app[HOSTS], app[BROWSERS] = feed, obey, frozenset(hosts), set()
-    folder = files('flat_planner_ros.ros.live_view') / 'page'
-    for path, (name, kind) in PAGES.items():
-        app.router.add_get(path, _page((folder / name).read_text('utf-8'), kind))
+    for file in (files('flat_planner_ros.ros.live_view') / 'page').iterdir():
+        kind = KINDS.get(PurePath(file.name).suffix)
+        if kind is not None:
+            path = '/' if file.name == START_PAGE else f'/{file.name}'
+            app.router.add_get(path, _page(file.read_text('utf-8'), kind))
     app.router.add_get('/ws', _converse)
     app.on_shutdown.append(_dismiss)
     return app

@@ -1,16 +1,20 @@
-// Drawing: the arm, and plots that scroll. Times are seconds on the page's axis.
+// One plot on a canvas: axes, lines of rows, bounds, envelopes and marks. Nothing here knows what is shown.
 
-const GAP = 0.25;        // [s] between two rows that no line bridges
-export const TRAIL = 1.5;       // [s] of the tip's way that is shown
+import {within} from './store.js';
+import {minus} from './words.js';
+
+const GAP = 0.25;      // [s] between two rows that no line bridges
 const PAD = {left: 52, right: 8, top: 6, bottom: 18};
-const REDUCED_LENGTHS = [1, 0.62];  // of the last two links, where the model has none
+const NARROWING = 0.04;   // share of the way by which a range narrows at each drawing
+const NEAR = 1;           // bounds this near to what is shown, in terms of its range, are shown, too
+const DENSE = 2;          // rows per pixel from which only their extremes are drawn
 
 export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
 // Return a context whose unit is a CSS pixel, with the size of the canvas.
-function prepared(canvas) {
+export function prepared(canvas) {
   const scale = window.devicePixelRatio || 1;
   const {width, height} = canvas.getBoundingClientRect();
   const [w, h] = [Math.round(width * scale), Math.round(height * scale)];
@@ -34,228 +38,195 @@ export function ticks(low, high, most) {
   return {found: [], decimals: 0};
 }
 
-// One plot. `lines` are {rows, column, factor, colour, planned}.
+// Return the points of a line, of dense rows the extremes in each pixel; null where the line is broken.
+export function points({rows, column, factor = 1}, from, to, pixels, gap = GAP) {
+  const found = [];
+  const bin = rows.length > DENSE * pixels ? (to - from) / pixels : 0;
+  let last = -Infinity;
+  let [low, high, until] = [null, null, -Infinity];
+  const flush = () => {
+    if (low !== null) found.push(...(low[0] <= high[0] ? [low, high] : [high, low]));
+    [low, high] = [null, null];
+  };
+  for (const row of rows) {
+    const [time, value] = [row[0], row[column]];
+    const is_known = value !== null && value !== undefined;
+    if (!is_known || time - last > gap) { flush(); found.push(null); }
+    last = is_known ? time : -Infinity;
+    if (!is_known) continue;
+    const point = [time, value * factor];
+    if (!bin) { found.push(point); continue; }
+    if (time >= until) { flush(); until = time + bin; }
+    if (low === null || point[1] < low[1]) low = point;
+    if (high === null || point[1] > high[1]) high = point;
+  }
+  flush();
+  return found;
+}
+
+// `smallest` is half the shortest range of values, `base` a value that is always shown.
 export class Plot {
-  constructor(canvas, smallest) {
-    this.canvas = canvas;
-    this.smallest = smallest;  // half the shortest range of values
+  constructor(canvas, {smallest, base = null, second = null}) {
+    Object.assign(this, {canvas, smallest, base, second});
     this.range = null;
+    this.box = null;
   }
 
-  draw({from, to, lines, shaded, envelopes = [], cursor = null}) {
+  // `lines` are {rows, column, factor, colour, planned}; `bounds` {value, colour}, `curves` {start, until,
+  // at(t, sign), colour, dashed}, `marks` {at, text, colour}; `zero` is where the horizontal axis counts from.
+  draw({from, to, zero = 0, unit = 's', gap = GAP, lines, shaded = null, bounds = [], curves = [], marks = [], cursor = null}) {
     const {context: c, width, height} = prepared(this.canvas);
-    const box = {x: PAD.left, y: PAD.top, w: width - PAD.left - PAD.right, h: height - PAD.top - PAD.bottom};
-    const visible = lines.map(line => ({...line, rows: within(line.rows, from, to)}));
-    const [low, high] = this.limits(visible);
+    if (!width || to <= from) return;
+    const box = {x: PAD.left, y: PAD.top, w: width - PAD.left - (this.second ? 44 : PAD.right), h: height - PAD.top - PAD.bottom};
+    const visible = lines.map(line => ({...line, points: points({...line, rows: within(line.rows, from, to)}, from, to, box.w, gap)}));
+    const [low, high] = this.limits(visible, bounds);
     const X = t => box.x + (t - from) / (to - from) * box.w;
     const Y = v => box.y + (high - v) / (high - low) * box.h;
-
+    Object.assign(this, {box, X, Y});
     c.font = '11px system-ui, sans-serif';
-    if (shaded) {
-      const [a, b] = [Math.max(shaded[0], from), Math.min(shaded[1], to)];
-      c.fillStyle = colour('--shade');
-      if (b > a) c.fillRect(X(a), box.y, X(b) - X(a), box.h);
-    }
-    this.axes(c, box, X, Y, from, to, low, high);
+    if (shaded) this.shade(c, Math.max(shaded[0], from), Math.min(shaded[1], to));
+    this.vertical(c, low, high);
+    this.horizontal(c, from - zero, to - zero, zero, unit);
     c.save();
     c.beginPath();
     c.rect(box.x, box.y, box.w, box.h);
     c.clip();
-    for (const line of visible) this.line(c, line, X, Y);
-    for (const e of envelopes) this.envelope(c, e, from, to, X, Y);
-    if (cursor !== null) {
-      c.strokeStyle = colour('--soft');
-      c.lineWidth = 1;
-      c.beginPath();
-      c.moveTo(X(cursor), box.y);
-      c.lineTo(X(cursor), box.y + box.h);
-      c.stroke();
-    }
+    for (const line of visible) this.line(c, line);
+    for (const bound of bounds) this.bound(c, bound, low, high);
+    for (const curve of curves) this.curve(c, curve, from, to);
+    for (const mark of marks) this.mark(c, mark);
+    if (cursor !== null) this.mark(c, {at: cursor, colour: '--soft'});
     c.restore();
-    return {from, to, box};
   }
 
   // The range widens at once and narrows slowly, so that the picture stays calm.
-  limits(lines) {
-    let [low, high] = [Infinity, -Infinity];
-    for (const {rows, column, factor = 1} of lines) {
-      for (const row of rows) {
-        const value = row[column];
-        if (value === null || value === undefined) continue;
-        low = Math.min(low, value * factor);
-        high = Math.max(high, value * factor);
+  limits(lines, bounds) {
+    let [low, high] = this.base === null ? [Infinity, -Infinity] : [this.base, this.base];
+    for (const line of lines) {
+      for (const point of line.points) {
+        if (point === null) continue;
+        if (point[1] < low) low = point[1];
+        if (point[1] > high) high = point[1];
       }
     }
     if (low > high) [low, high] = [0, 0];
+    const near = NEAR * Math.max(high - low, 2 * this.smallest);
+    const [bottom, top] = [low, high];
+    for (const {value} of bounds) {
+      if (value > top && value - top < near) high = Math.max(high, value);
+      if (value < bottom && bottom - value < near) low = Math.min(low, value);
+    }
     const middle = (low + high) / 2;
     const half = Math.max((high - low) / 2 * 1.12, this.smallest);
-    const wanted = [middle - half, middle + half];
-    const r = this.range;
-    this.range = r === null ? wanted : [
-      wanted[0] < r[0] ? wanted[0] : r[0] + 0.04 * (wanted[0] - r[0]),
-      wanted[1] > r[1] ? wanted[1] : r[1] + 0.04 * (wanted[1] - r[1]),
+    const wanted = this.base === null ? [middle - half, middle + half] : [this.base, this.base + 2 * half];
+    const r = this.range ?? wanted;
+    this.range = [
+      wanted[0] < r[0] ? wanted[0] : r[0] + NARROWING * (wanted[0] - r[0]),
+      wanted[1] > r[1] ? wanted[1] : r[1] + NARROWING * (wanted[1] - r[1]),
     ];
     return this.range;
   }
 
-  axes(c, box, X, Y, from, to, low, high) {
+  shade(c, from, to) {
+    if (to <= from) return;
+    c.fillStyle = colour('--shade');
+    c.fillRect(this.X(from), this.box.y, this.X(to) - this.X(from), this.box.h);
+  }
+
+  // Values at the left; at the right the same in a second unit.
+  vertical(c, low, high) {
+    const {box, Y, second} = this;
+    const {found, decimals} = ticks(low, high, 5);
     c.strokeStyle = colour('--grid');
     c.fillStyle = colour('--soft');
     c.lineWidth = 1;
-    c.beginPath();
-    const vertical = ticks(low, high, 5);
-    c.textAlign = 'right';
     c.textBaseline = 'middle';
-    for (const v of vertical.found) {
+    c.beginPath();
+    for (const v of found) {
       c.moveTo(box.x, Math.round(Y(v)) + 0.5);
       c.lineTo(box.x + box.w, Math.round(Y(v)) + 0.5);
-      c.fillText(v.toFixed(vertical.decimals).replace('-', '−'), box.x - 6, Y(v));
+      c.textAlign = 'right';
+      c.fillText(minus(v.toFixed(decimals)), box.x - 6, Y(v));
+      c.textAlign = 'left';
+      if (second) c.fillText(second(v), box.x + box.w + 4, Y(v));
     }
-    // Seconds before the right edge: what a clock counts since its own start means nothing to a person.
-    const horizontal = ticks(from - to, 0, 6);
+    c.stroke();
+  }
+
+  horizontal(c, from, to, zero, unit) {
+    const {box, X} = this;
+    const {found, decimals} = ticks(from, to, Math.max(3, Math.min(6, box.w / 90)));
+    c.strokeStyle = colour('--grid');
+    c.fillStyle = colour('--soft');
     c.textAlign = 'center';
     c.textBaseline = 'top';
-    for (const t of horizontal.found) {
-      const x = X(to + t);
+    c.beginPath();
+    for (const t of found) {
+      const x = X(zero + t);
       c.moveTo(Math.round(x) + 0.5, box.y);
       c.lineTo(Math.round(x) + 0.5, box.y + box.h);
-      if (x > box.x + 10 && x < box.x + box.w - 14) {
-        c.fillText(`${t.toFixed(horizontal.decimals).replace('-', '−')} s`, x, box.y + box.h + 4);
-      }
+      if (x < box.x + 10 || x > box.x + box.w - 14) continue;
+      c.fillText(`${minus(t.toFixed(decimals))} ${unit}`, x, box.y + box.h + 4);
     }
     c.stroke();
   }
 
   // What is planned is a wide, pale line: what is measured lies on it, and both are seen where they agree.
-  line(c, {rows, column, factor = 1, colour: name, planned}, X, Y) {
+  line(c, {points: found, colour: name, planned}) {
     c.strokeStyle = colour(name);
     c.lineWidth = planned ? 6 : 1.6;
+    c.lineJoin = 'round';
     c.globalAlpha = planned ? 0.3 : 1;
     c.beginPath();
-    let last = -Infinity;
-    for (const row of rows) {
-      const value = row[column];
-      if (value === null || value === undefined) { last = -Infinity; continue; }
-      if (row[0] - last > GAP) c.moveTo(X(row[0]), Y(value * factor));
-      else c.lineTo(X(row[0]), Y(value * factor));
-      last = row[0];
+    let is_new = true;
+    for (const point of found) {
+      if (point === null) { is_new = true; continue; }
+      if (is_new) c.moveTo(this.X(point[0]), this.Y(point[1])); else c.lineTo(this.X(point[0]), this.Y(point[1]));
+      is_new = false;
     }
     c.stroke();
     c.globalAlpha = 1;
   }
 
-  envelope(c, {start, until, at}, from, to, X, Y) {
+  // A limit: a dashed line, and a pale ground beyond it. One without a colour only widens the range.
+  bound(c, {value, colour: name, side}, low, high) {
+    if (!name || value < low || value > high) return;
+    const {box, Y} = this;
+    const edge = side > 0 ? box.y : box.y + box.h;
+    c.fillStyle = c.strokeStyle = colour(name);
+    c.globalAlpha = 0.08;
+    c.fillRect(box.x, Math.min(edge, Y(value)), box.w, Math.abs(Y(value) - edge));
+    c.globalAlpha = 1;
+    this.stroke(c, [[box.x, Y(value)], [box.x + box.w, Y(value)]], [7, 4]);
+  }
+
+  curve(c, {start, until, at, colour: name, dashed}, from, to) {
     const [a, b] = [Math.max(start, from), Math.min(until, to)];
     if (b <= a) return;
-    c.strokeStyle = colour('--error');
-    c.lineWidth = 1.1;
+    c.strokeStyle = colour(name);
     for (const sign of [1, -1]) {
-      c.beginPath();
-      for (let k = 0; k <= 60; k++) {
-        const t = a + (b - a) * k / 60;
-        c.lineTo(X(t), Y(at(t, sign)));
-      }
-      c.stroke();
+      const times = Array.from({length: 61}, (_, k) => a + (b - a) * k / 60);
+      this.stroke(c, times.map(t => [this.X(t), this.Y(at(t, sign))]), dashed ? [3, 3] : []);
     }
   }
-}
 
-// Return the rows between two times, and one beyond either end.
-export function within(rows, from, to) {
-  return rows.slice(Math.max(0, place(rows, from) - 1), place(rows, to) + 1);
-}
-
-// Return how many rows come before a time, by bisection.
-export function place(rows, time) {
-  let [low, high] = [0, rows.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (rows[middle][0] < time) low = middle + 1; else high = middle;
+  mark(c, {at, text = '', colour: name}) {
+    const {box} = this;
+    const x = this.X(at);
+    c.strokeStyle = c.fillStyle = colour(name);
+    this.stroke(c, [[x, box.y], [x, box.y + box.h]], text ? [2, 3] : []);
+    const is_right = x > box.x + box.w / 2;
+    c.textAlign = is_right ? 'right' : 'left';
+    c.textBaseline = 'top';
+    c.fillText(text, x + (is_right ? -4 : 4), box.y + 2);
   }
-  return low;
-}
 
-// The arm seen from above: measured, planned as a shadow, the goal as a dashed line.
-export function drawArm(canvas, {joints, lengths, measured, reference, goal, trail}) {
-  const {context: c, width, height} = prepared(canvas);
-  const links = lengths ?? [...Array(Math.max(0, joints - 2)).fill(1), ...REDUCED_LENGTHS];
-  const reach = links.reduce((sum, l) => sum + l, 0) * 1.12;
-  const scale = Math.min(width, height) / 2 / reach;
-  const place = p => [width / 2 + p[0] * scale, height / 2 - p[1] * scale];
-
-  const points = angles => {
-    const found = [[0, 0]];
-    let [theta, x, y] = [0, 0, 0];
-    angles.forEach((angle, k) => {
-      theta += angle ?? 0;
-      x += links[k] * Math.cos(theta);
-      y += links[k] * Math.sin(theta);
-      found.push([x, y]);
-    });
-    return found;
-  };
-
-  c.strokeStyle = colour('--grid');
-  c.lineWidth = 1;
-  for (const part of [1 / 3, 2 / 3, 1]) {
+  stroke(c, pixels, dashes) {
+    c.lineWidth = 1.1;
+    c.setLineDash(dashes);
     c.beginPath();
-    c.arc(width / 2, height / 2, part * reach / 1.12 * scale, 0, 2 * Math.PI);
+    for (const pixel of pixels) c.lineTo(...pixel);
     c.stroke();
+    c.setLineDash([]);
   }
-  c.beginPath();
-  c.moveTo(0, height / 2); c.lineTo(width, height / 2);
-  c.moveTo(width / 2, 0); c.lineTo(width / 2, height);
-  c.stroke();
-
-  const tip = angles => place(points(angles).at(-1));
-  c.strokeStyle = colour(`--s${(joints - 1) % 6}`);
-  c.lineCap = 'round';
-  c.lineWidth = 2;
-  for (let k = 1; k < trail.length; k++) {
-    c.globalAlpha = 0.5 * k / trail.length;
-    c.beginPath();
-    c.moveTo(...tip(trail[k - 1]));
-    c.lineTo(...tip(trail[k]));
-    c.stroke();
-  }
-  c.globalAlpha = 1;
-  if (goal) drawLinks(c, points(goal).map(place), {dashed: true});
-  if (reference) drawLinks(c, points(reference).map(place), {shadow: true});
-  if (measured) drawLinks(c, points(measured).map(place), {});
-}
-
-function drawLinks(c, points, {dashed, shadow}) {
-  const last = points.length - 2;
-  c.lineCap = c.lineJoin = 'round';
-  for (let k = 0; k <= last; k++) {
-    c.strokeStyle = dashed || shadow ? colour('--soft') : colour(`--s${k % 6}`);
-    c.globalAlpha = shadow ? 0.28 : 1;
-    c.lineWidth = dashed ? 1.2 : shadow ? 13 : 8;
-    c.setLineDash(dashed ? [5, 5] : []);
-    c.beginPath();
-    c.moveTo(...points[k]);
-    c.lineTo(...points[k + 1]);
-    c.stroke();
-  }
-  c.setLineDash([]);
-  c.globalAlpha = 1;
-  if (dashed || shadow) return;
-  points.forEach((point, k) => {
-    c.beginPath();
-    c.arc(...point, k === 0 ? 9 : k > last ? 4 : 6.5, 0, 2 * Math.PI);
-    c.fillStyle = colour('--card');
-    c.fill();
-    c.strokeStyle = colour('--text');
-    c.lineWidth = 2;
-    c.stroke();
-  });
-  // The elastic joint is the one with a spring.
-  const [x, y] = points[last];
-  c.beginPath();
-  for (let a = 0; a < 4 * Math.PI; a += 0.2) {
-    const r = 1 + 4 * a / (4 * Math.PI);
-    c.lineTo(x + r * Math.cos(a), y + r * Math.sin(a));
-  }
-  c.lineWidth = 1;
-  c.stroke();
 }
