@@ -54,6 +54,8 @@ MESSAGES_ALLOWED = {
     'diagnostics.py': 'the same for verdicts and reports',
     'estimates.py': 'the same for estimates, reported and adopted',
     '*_node.py': 'the types of its topics and services',
+    'page_commands.py': 'goals and services of the live view',
+    'status_news.py': 'verdicts and reports as the live view shows them',
     'model_adoption.py': 'hears reports and answers a service for the planner node',
     'row.py': 'descriptors of parameters, from rcl_interfaces',
     'node_parameters.py': 'verdicts on changed parameters, from rcl_interfaces',

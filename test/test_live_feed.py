@@ -17,7 +17,7 @@
 import json
 from math import inf, nan
 
-from flat_planner_ros.ros.live_view.feed import Cursor, Feed, HISTORY
+from flat_planner_ros.ros.live_view.feed import Cursor, Feed, HISTORY, PORTION
 
 
 def test_each_browser_is_told_everything_once():
@@ -49,9 +49,28 @@ def test_the_past_is_bounded_and_a_slow_browser_gets_what_is_left_of_it():
     feed.news(cursor)
     for k in range(3 * HISTORY):
         feed.append('a', [k])
-    rows = feed.news(cursor)['streams']['a']
-    assert len(rows) == HISTORY
-    assert rows[-1] == [3 * HISTORY - 1]
+    rows = []
+    while news := feed.news(cursor):
+        portion = news['streams']['a']
+        assert len(portion) <= PORTION
+        rows += portion
+    assert rows == [[k] for k in range(2 * HISTORY, 3 * HISTORY)]
+
+
+def test_rows_that_come_while_the_past_is_told_follow_it():
+    feed, cursor = Feed(['a']), Cursor()
+    for k in range(2 * PORTION):
+        feed.append('a', [k])
+    first = feed.news(cursor)['streams']['a']
+    feed.append('a', [2 * PORTION])
+    rows = first + feed.news(cursor)['streams']['a'] + feed.news(cursor)['streams']['a']
+    assert rows == [[k] for k in range(2 * PORTION + 1)]
+
+
+def test_times_are_as_exact_after_days():
+    feed = Feed(['a'])
+    feed.append('a', [300_000.0101, 1 / 3])
+    assert feed.news(Cursor())['streams']['a'] == [[300_000.0101, 0.3333333]]
 
 
 def test_a_restart_voids_what_was_told():

@@ -135,9 +135,7 @@ class LiveNode(GuardedNode):
         listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED)
         listen(DiagnosticArray, status, self._verdicts.hear, history)
         listen(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
-        listen(
-            DiagnosticArray, interfaces.DIAGNOSTICS, self._on_diagnostics, interfaces.RELIABLE
-        )
+        listen(DiagnosticArray, interfaces.DIAGNOSTICS, self._on_diagnostics, interfaces.RELIABLE)
 
     def _receiver(self, stream: str) -> Callable[[bytes], None]:
         """Return the callback of a stream, which reads only what will be shown."""

@@ -20,12 +20,12 @@ from time import monotonic
 from typing import Any
 
 from flat_planner_ros.ros.live_view.feed import Feed
-from flat_planner_ros.ros.live_view.page_settings import SETTINGS, SHOWN
+from flat_planner_ros.ros.live_view.page_settings import ROWS, SETTINGS, SHOWN
 from flat_planner_ros.ros.parameters.limits import LIMITS
 from flat_planner_ros.ros.wire import interfaces
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 PERIOD = 1.0
@@ -89,9 +89,17 @@ class NodePoll:
             self._use_joints(known[JOINTS])
 
     async def _values(self, name: str, names: Sequence[str]) -> Mapping[str, Any]:
-        """Return parameters of a node as JSON knows them: null for none, and for no limit."""
-        values = (await self.clients[name].get_parameters(list(names))).values
-        return dict(zip(names, map(_plain, map(parameter_value_to_python, values)), strict=False))
+        """Return parameters of a node as JSON knows them; what has no value is left out."""
+        rows = ROWS[name]
+        # A parameter without a value would leave the others of the same question unanswered.
+        alone = [key for key in names if isinstance(rows[key].given, Parameter.Type)]
+        together = [key for key in names if key not in alone]
+        known: dict[str, Any] = {}
+        for question in filter(None, (together, *([key] for key in alone))):
+            values = (await self.clients[name].get_parameters(question)).values
+            answers = [_plain(parameter_value_to_python(value)) for value in values]
+            known |= dict(zip(question, answers, strict=False))
+        return known
 
     def _on_poll(self) -> None:
         """See which nodes are there and ask those that have answered before."""
@@ -108,7 +116,7 @@ class NodePoll:
 
 
 def _plain(value: Any) -> Any:
-    """Return a parameter's value with null in the place of what is no number."""
+    """Return a parameter's value as JSON knows it: null where there is no limit."""
     if isinstance(value, float):
         return value if isfinite(value) else None
     if isinstance(value, str | bool | int) or value is None:

@@ -80,7 +80,7 @@ export class Reports {
     if (!verdict || start === null || Math.abs(plan.start - start) > AGE) return [];
     const {predicted_residual: nominal, predicted_residual_worst: worst} = verdict.values;
     if (nominal === undefined) return [];
-    return [['predicted, as modelled', `${precise(MILLI * nominal, 3)} mrad`],
+    return [['predicted', `${precise(MILLI * nominal, 3)} mrad`],
       ...(worst === undefined ? [] : [['predicted at worst', `${precise(MILLI * worst, 3)} mrad`]])];
   }
 

@@ -46,15 +46,15 @@ export class SettingsForm {
 
   field(name, group) {
     const {description, allowed, choices: texts, kind, unit} = this.choices[name];
-    const label = element('label', wording(group ? name.slice(group.length + 1) : name));
+    const label = element('label');
+    const title = element('span', `${wording(group ? name.slice(group.length + 1) : name)} `);
+    if (unit) title.append(element('small', unit));
     const input = element(texts.length ? 'select' : 'input', '', {name, title: `${name}: ${description}${allowed ? `; ${allowed}` : ''}`});
     input.append(...texts.map(text => element('option', text)));
     if (kind === 'truth') input.type = 'checkbox';
     if (kind === 'number') input.inputMode = 'decimal';
     input.oninput = () => { READERS[kind](input); this.mark(); };
-    const right = element('span');
-    right.append(input, unit ? ` ${unit}` : '');
-    label.append(right);
+    label.append(title, input);
     return label;
   }
 
