@@ -12,19 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The live view: by its protocol, and in a real browser where there is one."""
+"""The live view by its protocol."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
-from contextlib import asynccontextmanager
-import json
-from math import pi
 from pathlib import Path
 import re
-import shutil
 import signal
 import socket
-import subprocess
 from time import monotonic
 
 import pytest
@@ -36,113 +30,7 @@ aiohttp = pytest.importorskip('aiohttp')
 from flat_planner_ros.ros import live_view as live  # noqa: E402, I100  They need it.
 from flat_planner_ros.ros.live_view import live_node  # noqa: E402
 from flat_planner_ros.ros.live_view.server import MAX_BROWSERS, RATE  # noqa: E402
-
-PAGE = Path(live.__file__).parent / 'page'
-
-TIMEOUT = 20.0
-"""Time in which anything must happen that happens at all [s]."""
-
-CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser'))), None)
-
-NODE = shutil.which('node')
-
-BROWSER_ARGUMENTS = [
-    '--no-sandbox',
-    '--disable-gpu',
-    '--disable-quic',
-    '--no-first-run',
-    '--disable-background-networking',
-    '--disable-component-update',
-    '--disable-sync',
-]
-
-
-class Browser:
-    """What a page knows and can ask for."""
-
-    def __init__(self, ws: aiohttp.ClientWebSocketResponse) -> None:
-        """Know nothing."""
-        self.ws = ws
-        self.values: dict = {}
-        self.streams: dict = {}
-        self.replies: dict = {}
-        self.messages = 0
-
-    async def hear(self) -> None:
-        """Take one message."""
-        news = await self.ws.receive_json()
-        self.messages += 1
-        self.values |= news.get('values', {})
-        if news.get('restart'):
-            self.streams = {}
-        for name, rows in news.get('streams', {}).items():
-            self.streams.setdefault(name, []).extend(rows)
-        if 'reply' in news:
-            self.replies[news['reply']['id']] = news['reply']
-
-    async def expect(self, condition: Callable[[], object], what: str) -> None:
-        """Hear messages until a condition holds."""
-        deadline = monotonic() + TIMEOUT
-        while not condition():
-            left = deadline - monotonic()
-            try:
-                await asyncio.wait_for(self.hear(), left)
-            except asyncio.TimeoutError:
-                pytest.fail(f'not within {TIMEOUT:g} s: {what}; known: {self.values}')
-
-    async def ask(self, **command: object) -> dict:
-        """Return the reply to a command."""
-        number = len(self.replies) + 1
-        await self.ws.send_json({**command, 'id': number})
-        await self.expect(lambda: number in self.replies, f'a reply to {command}')
-        return self.replies[number]
-
-
-class View:
-    """A live view in a process of its own."""
-
-    def __init__(self, graph, *arguments: str) -> None:
-        """Start it."""
-        self.process = graph.start('live_view', '--port', '0', *arguments)
-        graph.expect(lambda: '(until' in self.process.stdout, 'the address')
-        self.url = re.search(r'http://\S+/', self.process.stdout)[0]
-
-    @property
-    def host(self) -> str:
-        """Return host and port."""
-        return self.url.removeprefix('http://').removesuffix('/')
-
-    @asynccontextmanager
-    async def browser(self, **headers: str):
-        """Give a browser that watches."""
-        async with (
-            aiohttp.ClientSession() as session,
-            session.ws_connect(self.url + 'ws', headers=headers) as ws,
-        ):
-            yield Browser(ws)
-
-    def run(self, act: Callable[[Browser], Awaitable[None]]) -> None:
-        """Do something in a browser."""
-
-        async def watch() -> None:
-            async with self.browser() as browser:
-                await act(browser)
-
-        asyncio.run(watch())
-
-
-def start_demo(graph, *arguments: str):
-    """Return the three nodes in a process."""
-    return graph.start('demo', '--ros-args', '-p', 'flat_monitor:window:=1.0', *arguments)
-
-
-def is_ready(browser: Browser) -> bool:
-    """Return whether all three nodes are there and the arm is seen."""
-    return bool(
-        all(browser.values.get('nodes', {'': False}).values())
-        and browser.values.get('settings of flat_plant')
-        and browser.streams.get('measured')
-    )
+from ros.live_view.viewer import Browser, is_ready, PAGE, start_demo, View  # noqa: E402
 
 
 def test_a_goal_leaves_a_verdict_and_a_residual_on_the_page(graph):
@@ -185,6 +73,11 @@ def test_a_goal_leaves_a_verdict_and_a_residual_on_the_page(graph):
         assert max(abs(row[5]) for row in during) > 1e-3
         assert any(abs(row[2]) > 0.01 for row in browser.streams['residual'])
         assert browser.streams['reference'][-1][1] == pytest.approx(1.0, abs=1e-3)
+        # What the plots need to set the two beside each other.
+        accepted = browser.values['verdicts'][-1]['values']
+        assert float(accepted['start_time']) - browser.values['epoch'] == pytest.approx(start)
+        assert float(accepted['predicted_residual_worst']) > 0.01
+        assert browser.values['plan']['way'][0] == [0.0, 0.0]
         assert (await browser.ask(do='call', service='reset'))['ok']
         reply = await browser.ask(do='call', service='adopt')
         assert reply['text']
@@ -192,6 +85,40 @@ def test_a_goal_leaves_a_verdict_and_a_residual_on_the_page(graph):
     view.run(act)
     assert view.process.stop(signal.SIGINT) == 0
     assert 'Traceback' not in view.process.stderr
+
+
+def test_via_points_limits_and_parameters_without_a_value(graph):
+    limits = ['-p', 'flat_planner:limits.effort:=[0.5, .inf]']
+    start_demo(graph, *limits)
+    view = View(graph)
+
+    async def act(browser: Browser) -> None:
+        await browser.expect(lambda: is_ready(browser), 'three nodes')
+        await browser.expect(lambda: 'limits' in browser.values, 'limits')
+        assert browser.values['limits'] == {
+            'position_min': None,
+            'position_max': None,
+            'velocity': None,
+            'effort': [0.5, None],
+        }
+        known = browser.values['settings of flat_plant']
+        # The imbalance has no value, the others are known all the same.
+        assert 'mismatch.imbalance' not in known
+        assert (known['noise.position_std'], known['drive']) == (0.0, 'effort')
+        via = [{'positions': [-0.2], 'time': 0.4}]
+        reply = await browser.ask(do='goal', positions=[0.3], duration=0.9, via=via)
+        assert reply['ok'], reply
+        await browser.expect(lambda: 'plan' in browser.values, 'a plan')
+        # The angle of the last link passes it.
+        assert min(sum(pose) for pose in browser.values['plan']['way']) < -0.19
+        # All of a change is taken, or none: here there is one bound too many.
+        values = {'insensitivity.weight': 10.0, 'insensitivity.max_residual': 0.1}
+        reply = await browser.ask(do='set', node='flat_planner', values=values)
+        assert not reply['ok']
+        after = browser.values['settings of flat_planner']
+        assert (after['insensitivity.weight'], after['insensitivity.max_residual']) == (0.0, 0.0)
+
+    view.run(act)
 
 
 def test_what_makes_no_sense_is_refused_with_a_reason(graph):
@@ -205,6 +132,16 @@ def test_what_makes_no_sense_is_refused_with_a_reason(graph):
         ({'do': 'goal', 'positions': [1.0], 'duration': -1.0}, 'duration must be'),
         ({'do': 'goal', 'positions': [1.0], 'duration': 10**400}, 'duration must be'),
         ({'do': 'goal'}, 'needs 1 positions'),
+        ({'do': 'goal', 'positions': [1.0], 'duration': 1.0, 'via': 'x'}, 'via must be a list'),
+        ({'do': 'goal', 'positions': [1.0], 'duration': 1.0, 'via': 51 * [{}]}, 'at most 50'),
+        ({'do': 'goal', 'positions': [1.0], 'duration': 1.0, 'via': [1.0]}, 'is an object'),
+        ({'do': 'goal', 'positions': [1.0], 'duration': 1.0, 'via': [{}]}, 'needs 1 positions'),
+        (
+            {'do': 'set', 'node': 'flat_plant', 'values': {'mismatch.imbalance': [1e-3, 0.0]}},
+            'full form',
+        ),
+        ({'do': 'set', 'node': 'flat_plant', 'values': {'mismatch.imbalance': 1}}, 'a list'),
+        ({'do': 'set', 'node': 'flat_plant', 'values': {'noise.position_std': -1}}, 'in [0, 10]'),
         ({'do': 'set', 'node': 'flat_planner', 'values': {'strategy': 'x'}}, 'one of'),
         ({'do': 'set', 'node': 'flat_planner', 'values': {'strategy': 1}}, 'must be a str'),
         ({'do': 'set', 'node': 'flat_planner', 'values': {'weights.r': -1}}, 'in [0, 1000]'),
@@ -451,108 +388,3 @@ def test_other_machines_are_let_in_only_if_asked_for(graph):
     open_view = View(graph, '--host', '0.0.0.0')
     assert 'no password' in open_view.process.stderr
     assert open_view.process.stop(signal.SIGTERM) == 0
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason='no Chromium')
-def test_a_goal_through_the_page_in_a_browser(graph, tmp_path):
-    playwright = pytest.importorskip('playwright.sync_api')
-    expect = playwright.expect
-    # A busy machine needs time to plan a stop.
-    start_demo(graph, '-p', 'flat_planner:replan.lookahead:=1.0')
-    view = View(graph)
-    complaints: list[str] = []
-    patience = 1000 * TIMEOUT
-    with playwright.sync_playwright() as library:
-        chromium = library.chromium.launch(executable_path=CHROMIUM, args=BROWSER_ARGUMENTS)
-        page = chromium.new_page(viewport={'width': 1280, 'height': 900})
-        page.on('pageerror', lambda error: complaints.append(str(error)))
-        page.on('console', lambda message: complaints.append(message.text))
-        page.goto(view.url)
-        expect(page.locator('#connection')).to_have_text('live', timeout=patience)
-        stiffness = page.locator('[name="mismatch.stiffness_scale"]')
-        expect(stiffness).to_have_value('1', timeout=patience)
-        stiffness.fill('1.1')
-        page.click('[data-node=flat_plant] .main')
-        expect(page.locator('[data-node=flat_plant] .answer')).to_have_text(
-            'mismatch.stiffness_scale = 1.1', timeout=patience
-        )
-        # A goal starts where the arm is, and shows degrees beside radians.
-        expect(page.locator('#goal-joints input')).to_have_value('0', timeout=patience)
-        page.fill('#goal-joints input', '1.0')
-        expect(page.locator('#goal-joints .degrees')).to_have_text('57.3°')
-        page.fill('#duration', '0.5')
-        page.click('#goal .main')
-        expect(page.locator('#goal-answer')).to_contain_text('plan 1', timeout=patience)
-        expect(page.locator('#goal-answer')).to_contain_text(re.compile('starts in 0'))
-        expect(page.locator('#prediction')).to_contain_text('mrad', timeout=patience)
-        expect(page.locator('#verdicts')).to_contain_text(
-            re.compile('finished|failed'), timeout=patience
-        )
-        expect(page.locator('#report-level')).to_have_class(
-            re.compile('warn|error'), timeout=patience
-        )
-        assert float(page.inner_text('#amplitude')) > 10.0  # mrad
-        page.click('[data-service=reset]')
-        expect(page.locator('#goal-answer')).to_contain_text('at rest at', timeout=patience)
-        # What is no number is marked, and what follows it counts.
-        for field, right in (('#goal-joints input', '90°'), ('#duration', '4')):
-            page.fill(field, 'nonsense')
-            page.press(field, 'Enter')
-            expect(page.locator(f'{field}:invalid')).to_have_count(1)
-            page.fill(field, right)
-            expect(page.locator(f'{field}:invalid')).to_have_count(0)
-        page.press('#duration', 'Enter')
-        expect(page.locator('#goal-answer')).to_contain_text('plan 2', timeout=patience)
-        page.keyboard.press('Escape')
-        expect(page.locator('#goal-answer')).to_contain_text('comes to rest', timeout=patience)
-        picture = page.screenshot(path=tmp_path / 'page.png')
-        expect(page.locator('#report-level')).to_contain_text('earlier', timeout=patience)
-        stiffness.fill('nonsense')
-        stiffness.press('Enter')
-        expect(page.locator('[name="mismatch.stiffness_scale"]:invalid')).to_have_count(1)
-        stiffness.fill('1.2')
-        stiffness.press('Enter')
-        expect(page.locator('[data-node=flat_plant] .answer')).to_have_text(
-            'mismatch.stiffness_scale = 1.2', timeout=patience
-        )
-        # A refusal stands beside the button.
-        page.fill('#duration', '0.01')
-        page.press('#duration', 'Enter')
-        expect(page.locator('#goal-answer')).to_contain_text('rejected', timeout=patience)
-        assert complaints == []
-        # The server goes and comes back: so does the page.
-        port = view.host.rpartition(':')[2]
-        assert view.process.stop(signal.SIGINT) == 0
-        expect(page.locator('#connection')).to_contain_text('not connected', timeout=patience)
-        View(graph, '--port', port)
-        expect(page.locator('#connection')).to_have_text('live', timeout=patience)
-        chromium.close()
-    assert picture.startswith(b'\x89PNG')
-
-
-@pytest.mark.skipif(NODE is None, reason='no Node.js')
-def test_the_words_of_the_page(tmp_path):
-    """Angles as people write them, and times as they say them."""
-    module = shutil.copy(PAGE / 'words.js', tmp_path / 'words.mjs')
-    script = f"""
-        import {{angle, inDegrees, number, readable}} from '{module.as_uri()}';
-        console.log(JSON.stringify([
-            ['1.57', '90deg', '-45 °', 'pi/2', '−3*π/4', '2pi', '1,5 rad'].map(angle),
-            ['abc', '', 'deg', 'pi/0'].map(angle),
-            ['0.4', '−1,5', ' ', '1e-3', '1x'].map(number),
-            [inDegrees(Math.PI / 3), inDegrees(-1), inDegrees(null)],
-            readable('plan 3, starts at 1795780633.296 s, in 0.050 s; not x'),
-            readable('wait for its end at 1795780633.296 s'),
-        ]));
-    """
-    answer = subprocess.run(
-        [NODE, '--input-type=module', '--eval', script], capture_output=True, text=True, check=True
-    )
-    angles, wrong, numbers, degrees, start, end = json.loads(answer.stdout)
-    expected = [1.57, pi / 2, -pi / 4, pi / 2, -3 * pi / 4, 2 * pi, 1.5]
-    assert angles == pytest.approx(expected)
-    assert wrong == [None] * 4
-    assert numbers == [0.4, -1.5, None, 1e-3, None]
-    assert degrees == ['60°', '−57.3°', '']
-    assert start == 'plan 3, starts in 0.050 s; not x'
-    assert re.fullmatch(r'wait for its end at \d+:\d+:\d+', end)

@@ -9,7 +9,8 @@ const QUANTITIES = {
   reference: {position: 'rad', velocity: 'rad/s', effort: 'N m'},
   residual: {position: 'rad'},
 };
-const CAPTION = 20;    // [px] above each plot
+const LINE = 18;       // [px] of a line of text
+const PAD = 12;        // [px] around all
 
 // Return the rows of the measured arm that are shown, with what is planned and what is left at the same times.
 export function table(store, from, to) {
@@ -27,7 +28,7 @@ export function table(store, from, to) {
 export function between(rows, time, count) {
   const next = place(rows, time);
   const [before, after] = [rows[Math.max(0, next - 1)], rows[next]];
-  if (!after || (after[0] !== time && after[0] - before[0] > GAP)) return new Array(count).fill('');
+  if (!after || (after[0] !== time && (next === 0 || after[0] - before[0] > GAP))) return new Array(count).fill('');
   const share = after[0] > before[0] ? (time - before[0]) / (after[0] - before[0]) : 1;
   return Array.from({length: count}, (_, k) => {
     const [a, b] = [before[1 + k], after[1 + k]];
@@ -44,31 +45,30 @@ function quoted(cell) {
 export function picture(figures, title) {
   const scale = window.devicePixelRatio || 1;
   const sizes = figures.map(({canvas}) => canvas.getBoundingClientRect());
-  const width = Math.max(...sizes.map(size => size.width)) + 24;
-  const height = 40 + sizes.reduce((sum, size) => sum + size.height + CAPTION + 8, 0);
+  const width = Math.max(...sizes.map(size => size.width)) + 2 * PAD;
+  const height = 4 * PAD + sizes.reduce((sum, size) => sum + size.height + 2 * LINE + PAD, 0);
   const whole = Object.assign(document.createElement('canvas'), {width: width * scale, height: height * scale});
   const c = whole.getContext('2d');
   c.scale(scale, scale);
   c.fillStyle = colour('--card');
   c.fillRect(0, 0, width, height);
-  write(c, title, 12, 24, 'bold 14px system-ui, sans-serif', colour('--text'));
-  let top = 40;
+  write(c, title, PAD, 2 * PAD, 'bold 14px system-ui, sans-serif', colour('--text'));
+  let top = 3.5 * PAD;
   figures.forEach((figure, k) => {
-    caption(c, figure, width - 12, top + 13);
-    c.drawImage(figure.canvas, 12, top + CAPTION, sizes[k].width, sizes[k].height);
-    top += sizes[k].height + CAPTION + 8;
+    caption(c, figure, top + LINE - 5);
+    c.drawImage(figure.canvas, PAD, top + 2 * LINE, sizes[k].width, sizes[k].height);
+    top += sizes[k].height + 2 * LINE + PAD;
   });
   return whole;
 }
 
-function caption(c, {title, unit, legend}, right, y) {
-  write(c, `${title}  [${unit}]`, 12, y, 'bold 13px system-ui, sans-serif', colour('--text'));
-  let x = right;
-  for (const {text, colour: tint} of [...legend].reverse()) {
-    c.font = '12px system-ui, sans-serif';
-    x -= c.measureText(text).width;
-    write(c, text, x, y, c.font, resolved(tint));
-    x -= 16;
+// The title of a plot, and below it the legend.
+function caption(c, {title, unit, legend}, y) {
+  write(c, `${title}  [${unit}]`, PAD, y, 'bold 13px system-ui, sans-serif', colour('--text'));
+  let x = PAD;
+  for (const {text, colour: tint} of legend) {
+    write(c, text, x, y + LINE - 2, '12px system-ui, sans-serif', resolved(tint));
+    x += c.measureText(text).width + PAD;
   }
 }
 

@@ -4,7 +4,7 @@ import {$, element, setText} from './dom.js';
 import {Plot} from './plots.js';
 import {spectrum} from './spectrum.js';
 import {rowAt} from './store.js';
-import {clock, fixed, inDegrees, minus} from './words.js';
+import {clock, fixed, inDegrees, roundDegrees} from './words.js';
 
 export const MILLI = 1000;
 const SPECTRUM_PERIOD = 400;    // [ms] between two looks at the spectrum
@@ -15,10 +15,10 @@ const HIGHEST = 10;             // [Hz] the same where that is not known
 export const tint = k => `--s${k % 6}`;
 
 export const plots = {
-  q: new Plot($('q'), {smallest: 0.05, second: v => inDegrees(v)}),
-  velocity: new Plot($('velocity'), {smallest: 0.05, second: v => inDegrees(v, 0)}),
+  q: new Plot($('q'), {smallest: 0.05, second: v => roundDegrees(v)}),
+  velocity: new Plot($('velocity'), {smallest: 0.05, second: v => roundDegrees(v)}),
   tau: new Plot($('tau'), {smallest: 1e-4, second: () => ''}),
-  residual: new Plot($('residual'), {smallest: 0.05, second: v => inDegrees(v / MILLI, 2)}),
+  residual: new Plot($('residual'), {smallest: 0.05, second: v => roundDegrees(v / MILLI, 2)}),
   spectrum: new Plot($('spectrum'), {smallest: 0.005, base: 0, second: () => ''}),
 };
 
@@ -26,7 +26,7 @@ export const plots = {
 export function drawFigures(store, view) {
   const {plan} = store.values;
   const common = {
-    from: view.from, to: view.to, zero: view.to, cursor: view.cursor === null ? null : view.instant,
+    from: view.from, to: view.to, zero: zeroOf(plan, view), cursor: view.cursor === null ? null : view.instant,
     shaded: plan ? [plan.start, plan.end] : null,
   };
   const n = store.joints.length;
@@ -38,6 +38,11 @@ export function drawFigures(store, view) {
   draw('residual', {...common, ...residual(store, arm)});
   drawSpectrum(store, view);
   legends(store, view);
+}
+
+// A window that moves counts back from its end, one that stands from the start of the motion.
+function zeroOf(plan, view) {
+  return view.isLive ? view.to : plan?.start ?? view.stood;
 }
 
 function draw(name, content) {
@@ -152,8 +157,8 @@ function legend(id, entries) {
 
 // When the pointer points to, as a person says it.
 function instantOf({values: {plan, epoch}}, view) {
-  const parts = [`${fixed(view.instant - view.to, 3)} s`];
-  if (plan && view.instant >= plan.start) parts.push(`${fixed(view.instant - plan.start, 3)} s from the start of the motion`);
+  const parts = [`${fixed(view.instant - zeroOf(plan, view), 3)} s`];
+  if (plan) parts.push(`${fixed(view.instant - plan.start, 3)} s from the start of the motion`);
   if (epoch !== undefined) parts.push(clock(epoch + view.instant));
   return parts.join(' · ');
 }
@@ -162,7 +167,7 @@ function instantOf({values: {plan, epoch}}, view) {
 export function openFigures() {
   return Object.keys(plots).filter(name => $(`${name}-figure`).open).map(name => ({
     canvas: $(name),
-    title: minus($(`${name}-figure`).querySelector('summary b').textContent),
+    title: $(`${name}-figure`).querySelector('summary b').textContent,
     unit: $(`${name}-figure`).querySelector('summary small').textContent,
     legend: [...$(`${name}-legend`).children].map(({textContent, style}) => ({text: textContent, colour: style.color})),
   }));

@@ -33,14 +33,18 @@ export function resampled(rows, column, begin, step, count) {
   });
 }
 
-// Return the amplitude of each frequency up to half of the sampling's, by a Hann window without the mean.
+// Return the amplitude of each frequency up to half of the sampling's, by a Hann window without mean and drift.
 export function amplitudes(values) {
-  const weights = values.map((_, k) => 0.5 - 0.5 * Math.cos(2 * Math.PI * (k + 0.5) / values.length));
-  const total = weights.reduce((sum, weight) => sum + weight, 0);
-  const mean = values.reduce((sum, value, k) => sum + weights[k] * value, 0) / total;
-  const size = 2 ** Math.ceil(Math.log2(FINER * values.length));
+  const count = values.length;
+  const weights = values.map((_, k) => 0.5 - 0.5 * Math.cos(2 * Math.PI * (k + 0.5) / count));
+  const places = values.map((_, k) => k - (count - 1) / 2);
+  const weighted = factors => weights.reduce((sum, weight, k) => sum + weight * factors(k), 0);
+  const total = weighted(() => 1);
+  const mean = weighted(k => values[k]) / total;
+  const drift = weighted(k => places[k] * values[k]) / weighted(k => places[k] ** 2);
+  const size = 2 ** Math.ceil(Math.log2(FINER * count));
   const [real, imaginary] = [new Float64Array(size), new Float64Array(size)];
-  values.forEach((value, k) => { real[k] = weights[k] * (value - mean); });
+  values.forEach((value, k) => { real[k] = weights[k] * (value - mean - drift * places[k]); });
   transform(real, imaginary);
   return Array.from({length: size / 2}, (_, k) => 2 * Math.hypot(real[k], imaginary[k]) / total);
 }

@@ -2,11 +2,13 @@
 
 const SHORTEST = 0.1;   // [s]
 const LONGEST = 600;    // [s]
+const LEAST = 0.5;      // share of the window in which something is to be seen
 
 export class TimeWindow {
   constructor(span) {
     this.span = span;
     this.end = null;      // null: the newest
+    this.stood = 0;       // the newest time when it came to stand
     this.newest = 0;
     this.oldest = 0;
     this.cursor = null;   // share of the width, null without one
@@ -23,7 +25,7 @@ export class TimeWindow {
 
   follow(oldest, newest) { [this.oldest, this.newest] = [oldest, newest]; }
 
-  stand() { this.end = this.to; }
+  stand() { this.standAt(this.to); }
 
   live() { this.end = null; }
 
@@ -36,8 +38,13 @@ export class TimeWindow {
 
   // Go back or forward [s]; who comes to the newest moves with it.
   move(seconds) {
-    const earliest = Math.min(this.newest, this.oldest + this.span);
+    const earliest = Math.min(this.newest, this.oldest + LEAST * this.span);
     const end = Math.max(earliest, this.to + seconds);
-    this.end = end < this.newest ? end : null;
+    if (end < this.newest) this.standAt(end); else this.live();
+  }
+
+  standAt(end) {
+    if (this.isLive) this.stood = this.newest;
+    this.end = end;
   }
 }

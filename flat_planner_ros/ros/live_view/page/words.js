@@ -34,6 +34,11 @@ export function inDegrees(radians, decimals = 1) {
   return radians === null || radians === undefined ? '' : minus(`${Number((radians / DEGREE).toFixed(decimals))}°`);
 }
 
+// The same short enough for an axis.
+export function roundDegrees(radians, digits = 3) {
+  return minus(`${Number((radians / DEGREE).toPrecision(digits))}°`);
+}
+
 // Return the numbers that a text lists, null if it lists none or something else.
 export function numbers(text) {
   const found = text.split(/[;\s]+|,\s+/).filter(part => part !== '').map(number);
