@@ -17,7 +17,7 @@
 from math import log, tau
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, NaturalMode, PlanarArm
+from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, NaturalMode
 from flat_planner_ros.core.session.recent_states import Inputs, RecentStates
 from flat_planner_ros.core.session.settings import SessionSettings
 from flat_planner_ros.core.session.timeline import Motion, Timeline
@@ -68,9 +68,9 @@ class MeasuredStart(NamedTuple):
     swing: Swing
 
 
-def swing_time(arm: PlanarArm) -> float:
+def swing_time(settings: SessionSettings) -> float:
     """Return how long the arm takes to swing once; no state is carried on for longer [s]."""
-    return tau / arm.natural_mode().frequency
+    return tau / _mode(settings).frequency
 
 
 def measured_start(

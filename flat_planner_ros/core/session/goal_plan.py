@@ -118,7 +118,7 @@ def settling_plan(settings: SessionSettings, start: MotionStart, last: FloatArra
             return rules.shortest_of(
                 lambda duration: plan(request(duration), arm, options), most=SETTLING_TRIALS
             )
-        usual = settings.default_duration or swing_time(arm)
+        usual = settings.default_duration or swing_time(settings)
         duration = min(max(usual, rules.shortest), rules.longest)
         return rules.plan_within(request(duration), arm, options, is_prescribed=True)[0]
 

@@ -163,7 +163,7 @@ def _caught(
         return None
     soonest = now + settings.lookahead
     time = soonest if stamp is None else stamp
-    latest = now + swing_time(settings.arm)
+    latest = now + swing_time(settings)
     if time > latest:
         return None
     if time < soonest:

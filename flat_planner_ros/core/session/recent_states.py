@@ -101,7 +101,8 @@ class RecentStates:
         None if less than half a swing has been seen, or if the passive joint stands beside its
         zero: no model explains that.
         """
-        swing = tau / arm.natural_mode().frequency
+        frequency = arm.natural_mode(held=inputs.is_held).frequency
+        swing = tau / frequency
         seen = self._since(MOST_SWINGS * swing)
         times = np.array([sample.time for sample in seen])
         if len(seen) < 3 or times[-1] - times[0] < LEAST_SWINGS * swing:
@@ -110,7 +111,7 @@ class RecentStates:
         if np.ptp(passive) < abs(passive.mean()):
             return None
         period = float(np.diff(times).mean())
-        bandwidth = min(RELATIVE_BANDWIDTH * arm.natural_mode().frequency, FASTEST / period)
+        bandwidth = min(RELATIVE_BANDWIDTH * frequency, FASTEST / period)
         observer = ArmObserver(arm, period, bandwidth, held=inputs.is_held)
         observer.restart(seen[0])
         known = inputs.at(times + 0.5 * period)
