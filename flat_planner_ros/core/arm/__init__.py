@@ -49,6 +49,7 @@ from flat_planner_ros.core.arm.samples import (
     JointStateRules,
     JUMP,
     SampledMotion,
+    SampleTable,
     travel,
     TurnCounter,
 )
@@ -96,6 +97,7 @@ __all__ = [
     'PlanarArm',
     'PLUGINS',
     'SampledMotion',
+    'SampleTable',
     'strict_arithmetic',
     'suggest_counterbalances',
     'travel',

@@ -21,6 +21,7 @@ from typing import TypeVar
 
 from flat_planner_ros.core.arm.arrays import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 Number = TypeVar('Number', float, FloatArray)
 
@@ -68,6 +69,59 @@ class JointSample:
     efforts: FloatArray | None = None
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SampleTable:
+    """
+    Measured states of the n joints at m times, as JointSample has each.
+
+    Attributes
+    ----------
+    times
+        Shape (m,) [s].
+    positions
+        Shape (m, n) [rad].
+    velocities, efforts
+        Shape (m, n) [rad/s], [N m]; ``None`` if unknown.
+
+    """
+
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray | None = None
+    efforts: FloatArray | None = None
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.times)
+
+    def sample(self, row: int) -> JointSample:
+        """Return one of the samples."""
+        return JointSample(
+            time=float(self.times[row]),
+            positions=self.positions[row],
+            velocities=None if self.velocities is None else self.velocities[row],
+            efforts=None if self.efforts is None else self.efforts[row],
+        )
+
+    def rows(self, rows: slice | NDArray[np.bool_]) -> 'SampleTable':
+        """Return some of the samples."""
+        return SampleTable(
+            times=self.times[rows],
+            positions=self.positions[rows],
+            velocities=None if self.velocities is None else self.velocities[rows],
+            efforts=None if self.efforts is None else self.efforts[rows],
+        )
+
+    def joints(self, places: NDArray[np.intp] | slice) -> 'SampleTable':
+        """Return the states of some joints."""
+        return SampleTable(
+            times=self.times,
+            positions=self.positions[:, places],
+            velocities=None if self.velocities is None else self.velocities[:, places],
+            efforts=None if self.efforts is None else self.efforts[:, places],
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class JointStateRules:
     """
@@ -113,6 +167,19 @@ class TurnCounter:
         if self._turns is None:
             return sample
         return replace(sample, positions=sample.positions + TURN * self._turns)
+
+    def unwrapped_table(self, samples: SampleTable) -> SampleTable | None:
+        """Return the next samples with their turns; None, and none taken, where a joint turns."""
+        former = self._former
+        if former is None:
+            return None
+        change = np.diff(samples.positions, axis=0, prepend=former.positions[None])
+        if not np.abs(change).max() <= pi:
+            return None
+        self._former = samples.sample(-1)
+        if self._turns is None:
+            return samples
+        return replace(samples, positions=samples.positions + TURN * self._turns)
 
     def align(self, place: FloatArray) -> None:
         """Count from the turns of a pose [rad] near which the arm is, or will be when heard."""

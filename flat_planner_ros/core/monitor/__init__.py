@@ -32,7 +32,7 @@ from flat_planner_ros.core.monitor.motion_record import joint_indices, PlannedMo
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation, OscillationFit
 from flat_planner_ros.core.monitor.report import VibrationReport
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
-from flat_planner_ros.core.monitor.vibration_monitor import VibrationMonitor
+from flat_planner_ros.core.monitor.vibration_monitor import Phase, VibrationMonitor
 
 __all__ = [
     'ActuatedJoints',
@@ -48,6 +48,7 @@ __all__ = [
     'ModelTuner',
     'MonitorSettings',
     'OscillationFit',
+    'Phase',
     'PlannedMotion',
     'ReportedEstimate',
     'ReportedModel',

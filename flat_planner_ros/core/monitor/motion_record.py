@@ -25,6 +25,7 @@ from flat_planner_ros.core.arm import (
     FloatArray,
     InvalidRequest,
     SampledMotion,
+    SampleTable,
 )
 import numpy as np
 from numpy.typing import NDArray
@@ -189,6 +190,30 @@ class Record:
         self._count += 1
         self._skip = self._stride - 1
 
+    def extend(self, times: FloatArray, rows: FloatArray) -> None:
+        """Add rows as `append` does, shapes (m,) and (m, width)."""
+        place = 0
+        while place < len(times):
+            skipped = min(self._skip, len(times) - place)
+            self._skip -= skipped
+            place += skipped
+            if place == len(times):
+                return
+            if self._count == RECORD_LIMIT:
+                self.append(float(times[place]), rows[place])
+                place += 1
+                continue
+            chosen = slice(
+                place, place + self._stride * (RECORD_LIMIT - self._count), self._stride
+            )
+            added = self._table[self._count : self._count + len(times[chosen])]
+            added[:, 0] = times[chosen]
+            added[:, 1:] = rows[chosen]
+            self._count += len(added)
+            # The last one added leaves out the same number as each before.
+            place += (len(added) - 1) * self._stride + 1
+            self._skip = self._stride - 1
+
     def shift(self, delay: float) -> None:
         """Set all times later [s]."""
         self._table[: self._count, 0] += delay
@@ -230,6 +255,16 @@ class Measured:
         """Keep positions [rad] during or after the motion, times ascending."""
         record = self._after if is_after else self._during
         record.append(time, positions)
+
+    def add_table(self, samples: SampleTable, *, is_after: bool, with_motors: bool) -> None:
+        """Keep samples from before or from after the end of the motion."""
+        times, positions = samples.times, samples.positions
+        efforts = np.full_like(positions, np.nan) if samples.efforts is None else samples.efforts
+        (self._after if is_after else self._during).extend(times, positions)
+        if not is_after:
+            self.efforts.extend(times, efforts)
+        if with_motors:
+            self.motors.extend(times, np.hstack((positions, efforts)))
 
     def shift(self, delay: float) -> None:
         """Set all times later [s]."""

@@ -18,8 +18,10 @@ from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor.course import Course
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion
+import numpy as np
 
 KEPT = 5.0
 """Time for which an arrival counts at least, and at most twice [s]: a clock may be set."""
@@ -50,6 +52,18 @@ class OffsetFilter:
             self._present = -inf
             self._since = arrival
         self._present = max(self._present, stamp - arrival)
+
+    def hear_all(self, stamps: FloatArray, arrivals: FloatArray) -> None:
+        """Take stamps that are `unnoticed`, shape (m,) [s]."""
+        self._present = max(self._present, float((stamps - arrivals).max()))
+
+    def unnoticed(self, stamps: FloatArray, arrivals: FloatArray) -> int:
+        """Return how many stamps in a row leave it at being no more than a slow transport."""
+        if self.offset is None or is_noticed(self.offset):
+            return 0
+        is_plain = (arrivals >= self._since) & (arrivals < self._since + KEPT)
+        is_plain &= stamps - arrivals < NOTICED
+        return int(np.append(is_plain, False).argmin())
 
     @property
     def offset(self) -> float | None:

@@ -18,16 +18,18 @@ from dataclasses import replace
 from enum import Enum
 from math import inf, isfinite, nan
 
-from flat_planner_ros.core.arm import InvalidRequest, JointSample, JUMP, travel
-from flat_planner_ros.core.monitor.course import DEGREES
+from flat_planner_ros.core.arm import FloatArray, JointSample, SampleTable
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.report import assess, VibrationReport
+from flat_planner_ros.core.monitor.sample_checks import (
+    check_size,
+    jump,
+    unremarkable,
+    UNUSABLE,
+)
 from flat_planner_ros.core.monitor.settings import MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import is_noticed, OffsetFilter, SampleClock
 import numpy as np
-
-UNUSABLE = 1e6
-"""Angle from which a sample is of no joint [rad]: damaged, or never set."""
 
 SAME_CLOCK = 3600.0
 """Time before its start within which a plan that arrives is of the node's own clock [s]."""
@@ -207,13 +209,13 @@ class VibrationMonitor:
         motion = self._motion
         if motion is None or self._phase is Phase.DONE:
             return self._take_reports()
-        _check_size(sample, motion)
+        check_size(sample, motion)
         # Between two motions an arm may be put elsewhere, and nobody minds.
         since = max(motion.start, time - self.settings.timeout)
         if former is not None and former.time >= since:
-            jump = _jump(former, sample, motion)
-            if jump:
-                self._close(time, jump)
+            cause = jump(former, sample, motion)
+            if cause:
+                self._close(time, cause)
                 return self._take_reports()
         if time <= motion.end:
             self._measured.efforts.append(time, nan if sample.efforts is None else sample.efforts)
@@ -224,6 +226,50 @@ class VibrationMonitor:
         if time >= motion.end + self.settings.window:
             self._close(time)
         return self._take_reports()
+
+    def add_table(
+        self, samples: SampleTable, arrivals: FloatArray
+    ) -> tuple[int, list[VibrationReport]]:
+        """
+        Hear and take samples one after the other, up to the first that makes a report.
+
+        Where nothing happens, many are taken at once: a recording has millions.
+
+        Parameters
+        ----------
+        samples
+            At least one, in the order of the motion's joints.
+        arrivals
+            When each came, by the clock of the plans [s].
+
+        Returns
+        -------
+        tuple
+            How many were taken, and the reports as of `add`.
+
+        Raises
+        ------
+        InvalidRequest
+            As `add`.
+
+        """
+        plain = unremarkable(samples, self._last, self.settings.timeout)
+        ends = np.append(np.flatnonzero(~plain), len(samples))
+        row = 0
+        while row < len(samples):
+            end = int(ends[np.searchsorted(ends, row)])
+            count = self._uneventful(samples.times[row:end], arrivals[row:end])
+            if count:
+                rows = slice(row, row + count)
+                self._add_rows(samples.rows(rows), arrivals[rows])
+                row += count
+                continue
+            self.hear(float(samples.times[row]), float(arrivals[row]))
+            reports = self.add(samples.sample(row))
+            row += 1
+            if reports:
+                return row, reports
+        return row, []
 
     def tick(self, now: float) -> list[VibrationReport]:
         """
@@ -268,11 +314,42 @@ class VibrationMonitor:
         """
         if self._motion is None:
             return None
-        _check_size(sample, self._motion)
+        check_size(sample, self._motion)
         position, velocity = self._motion.reference(sample.time + self._correction)
         return Residual(
             sample.positions - position,
             None if sample.velocities is None else sample.velocities - velocity,
+        )
+
+    def _uneventful(self, times: FloatArray, arrivals: FloatArray) -> int:
+        """Return how many samples that just follow each other start or end nothing."""
+        motion = self._motion
+        if self._correction or not times.size:
+            return 0
+        until = inf if self._pending is None else self._pending.start
+        if motion is not None and self._is_watching():
+            is_moving = self._phase is Phase.MOVING
+            until = min(until, motion.end + (0.0 if is_moving else self.settings.window))
+            # Time may have been told to be later than samples are.
+            if times[0] < motion.start or not (is_moving or times[0] > motion.end):
+                return 0
+        count = int(np.searchsorted(times, until))
+        return self._offset.unnoticed(times[:count], arrivals[:count])
+
+    def _add_rows(self, samples: SampleTable, arrivals: FloatArray) -> None:
+        """Take uneventful samples as `hear` and `add` do."""
+        self._offset.hear_all(samples.times, arrivals)
+        self._last = samples.sample(-1)
+        self._last_sample = self._heard = self._last.time
+        self._now = max(self._now, self._last.time)
+        motion = self._motion
+        if motion is None or not self._is_watching():
+            return
+        check_size(self._last, motion)
+        self._measured.add_table(
+            samples,
+            is_after=self._phase is Phase.SETTLING,
+            with_motors=self.settings.fits_model,
         )
 
     def _take_reports(self) -> list[VibrationReport]:
@@ -367,32 +444,3 @@ def _shows_motion(report: VibrationReport) -> bool:
     """Return whether the motion is seen about when it was planned."""
     course = report.course
     return course is not None and course.shift is not None and not course.is_late
-
-
-def _check_size(sample: JointSample, motion: PlannedMotion) -> None:
-    """Refuse a sample of other joints than the motion's."""
-    shape = (len(motion.joint_names),)
-    for values in (sample.positions, sample.velocities, sample.efforts):
-        if values is not None and values.shape != shape:
-            raise InvalidRequest(f'sample of shape {values.shape} for the joints {shape}')
-
-
-def _jump(former: JointSample, sample: JointSample, motion: PlannedMotion) -> str:
-    """Return which joint has come further than it can have moved, if one has."""
-    if former.positions.shape != sample.positions.shape:
-        return ''
-    change = sample.positions - former.positions
-    if np.abs(change).max() <= JUMP:
-        return ''
-    planned = motion.reference(sample.time)[0] - motion.reference(former.time)[0]
-    elapsed = sample.time - former.time
-    # A joint may stand still, follow the plan, or do so in degrees, which the report will say.
-    least = np.min([np.abs(change - factor * planned) for factor in (0.0, 1.0, DEGREES)], axis=0)
-    excess = least - travel(former, sample)
-    joint = int(np.argmax(excess))
-    if excess[joint] <= JUMP:
-        return ''
-    return (
-        f'{motion.joint_names[joint]} jumped by {change[joint]:.3g} rad within '
-        f'{1e3 * elapsed:.3g} ms at {sample.time:.3f} s'
-    )

@@ -42,11 +42,13 @@ from flat_planner_ros.ros.programs.outputs import (
     summary_stream,
     write_through,
 )
+from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.wire import diagnostics, interfaces
 
 if TYPE_CHECKING:
     from flat_planner_ros.ros.recording.recording import Recording
     from flat_planner_ros.ros.recording.replay import Judgement, Sources
+    from flat_planner_ros.ros.recording.storage import Entry
 
 AGREEMENT = 1e-9
 """Relative difference up to which a recorded report says the same, in 9 printed digits [-]."""
@@ -93,38 +95,39 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         from flat_planner_ros.ros.recording.recording import Recording
         from flat_planner_ros.ros.recording.replay import find_sources, replay
+        from flat_planner_ros.ros.recording.storage import storage_files
     except ImportError as error:
         return explain_missing(error, 'record')
+    recording = None
     try:
-        recording = Recording(options.file)
-    except (FlatPlannerError, OSError) as error:
-        print(f'analyse: {error}', file=sys.stderr)
-        return 1
-    try:
-        sources = find_sources(
-            recording,
-            namespace=options.namespace,
-            plan=options.plan,
-            joint_states=options.joint_states,
-        )
-        settings = _settings(options, recording, sources)
-        remarks: list[str] = []
-        judgements = replay(recording, sources, settings, remarks.append)
-        reports = [_as_dict(judgement) for judgement in judgements]
+        with progress(len(storage_files(options.file)), 'analyse') as advance:
+            recording = Recording(options.file, advance)
+            sources = find_sources(
+                recording,
+                namespace=options.namespace,
+                plan=options.plan,
+                joint_states=options.joint_states,
+            )
+            settings = _settings(options, recording, sources)
+            telling = _Telling(options, recording, sources)
+            replayed = replay(
+                recording, sources, settings, telling.remark, telling.hear, telling.topics
+            )
+            with redirect_stdout(summary_stream(options.json, options.plot)):
+                for judgement in replayed:
+                    telling.tell(judgement)
+                telling.end()
         if options.json is not None:
-            _write_json(options, recording, sources, reports, remarks)
-        with redirect_stdout(summary_stream(options.json, options.plot)):
-            _tell(options, recording, sources, reports, remarks)
-        if options.plot is not None:
-            _draw(judgements, options.plot)
+            telling.write_json(options.json)
     except FlatPlannerError as error:
-        damage = f'; {DAMAGED}: {recording.damage}' if recording.damage else ''
+        damage = '' if recording is None else recording.damage
+        damage = f'; {DAMAGED}: {damage}' if damage else ''
         print(f'analyse: {error}{damage}', file=sys.stderr)
         return 1
     except OSError as error:
         print(f'analyse: {explain_os(error)}', file=sys.stderr)
         return 1
-    return 0 if judgements else 1
+    return 0 if telling.count else 1
 
 
 def _parser() -> ArgumentParser:
@@ -178,52 +181,174 @@ def _settings(
     return known
 
 
-def _write_json(
-    options: Namespace,
-    recording: 'Recording',
-    sources: 'Sources',
-    reports: Sequence[Mapping[str, Any]],
-    remarks: Sequence[str],
-) -> None:
-    """Write the reports as JSON."""
-    document = {
-        'file': str(options.file),
-        'plan': sources.plan,
-        'joint_states': sources.joint_states,
-        'damage': recording.damage,
-        'remarks': list(remarks),
-        'reports': list(reports),
-    }
-    with open_text(options.json) as file:
-        print(json.dumps(document, indent=2, allow_nan=False), file=file)
+class _Telling:
+    """
+    Tells reports as they come.
 
+    Parameters
+    ----------
+    options
+        Of the command line.
+    recording, sources
+        What the reports are about.
 
-def _tell(
-    options: Namespace,
-    recording: 'Recording',
-    sources: 'Sources',
-    reports: Sequence[Mapping[str, Any]],
-    remarks: Sequence[str],
-) -> None:
-    """Print the reports."""
-    differences = _compared(reports, _recorded_reports(recording, sources))
-    print(f'{options.file}: plans from {sources.plan}, joint states from {sources.joint_states}')
-    if recording.damage:
-        print(f'{DAMAGED}: {recording.damage}')
-    for remark in remarks:
-        print(remark)
-    if not reports:
-        print('no motion to report on')
-    for number, (report, difference) in enumerate(zip(reports, differences, strict=True), 1):
-        print(f'\nmotion {number}: {report["level"].upper()}')
+    Attributes
+    ----------
+    count
+        Number of reports so far.
+    topics
+        Topics with the reports of the time, as far as they are recorded.
+
+    """
+
+    def __init__(self, options: Namespace, recording: 'Recording', sources: 'Sources') -> None:
+        usual = interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN)
+        report = interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
+        topic = sources.plan.removesuffix(usual) + report
+        self.topics = {topic} & set(recording.topics)
+        self.count = 0
+        self._options = options
+        self._recording = recording
+        self._sources = sources
+        self._recorded: dict[float, Mapping[str, Any]] = {}
+        self._waiting: dict[str, Any] | None = None
+        self._remarks: list[str] = []
+        self._reports: list[Mapping[str, Any]] = []
+        self._figure = _Figures(options.plot)
+        where = f'plans from {sources.plan}, joint states from {sources.joint_states}'
+        self._head = f'{options.file}: {where}'
+
+    def remark(self, text: str) -> None:
+        """Keep a remark for the end."""
+        self._remarks.append(text)
+
+    def hear(self, entry: 'Entry') -> None:
+        """Take a report of the time."""
+        msg = self._recording.read(entry)
+        for status in [] if msg is None else msg.status:
+            values: dict[str, Any] = {pair.key: _value(pair.value) for pair in status.values}
+            if 'start_time' in values:
+                self._recorded[values['start_time']] = values
+        if self._waiting and self._waiting['values']['start_time'] in self._recorded:
+            self._print()
+
+    def tell(self, judgement: 'Judgement') -> None:
+        """Print a report once the one of the time has come, at the latest with the next."""
+        self._print()
+        self._begin()
+        self.count += 1
+        self._waiting = _as_dict(judgement)
+        if self._options.json is not None:
+            self._reports.append(self._waiting)
+        self._figure.take(judgement)
+        start = self._waiting['values']['start_time']
+        self._recorded = {key: its for key, its in self._recorded.items() if key >= start}
+        if start in self._recorded:
+            self._print()
+
+    def end(self) -> None:
+        """Print what is left."""
+        self._print()
+        self._begin()
+        if not self.count:
+            print('no motion to report on')
+        for remark in self._remarks:
+            print(remark)
+        if self._recording.damage:
+            print(f'{DAMAGED}: {self._recording.damage}')
+        self._figure.end()
+
+    def write_json(self, name: str) -> None:
+        """Write the reports as JSON."""
+        document = {
+            'file': str(self._options.file),
+            'plan': self._sources.plan,
+            'joint_states': self._sources.joint_states,
+            'damage': self._recording.damage,
+            'remarks': self._remarks,
+            'reports': self._reports,
+        }
+        with open_text(name) as file:
+            print(json.dumps(document, indent=2, allow_nan=False), file=file)
+
+    def _begin(self) -> None:
+        """Print where it all comes from, once."""
+        if self._head:
+            print(self._head)
+            self._head = ''
+
+    def _print(self) -> None:
+        """Print the report that waits, if one does."""
+        report, self._waiting = self._waiting, None
+        if report is None:
+            return
+        print(f'\nmotion {self.count}: {report["level"].upper()}')
         print(f'  {report["message"]}')
         width = max(map(len, report['values']))
         for key, value in report['values'].items():
             shown = f'{value:.9f}' if key in ('start_time', 'end_time') else _shown(value)
             unit = UNITS.get(key.partition('.')[0], '')
             print(f'  {key:<{width}}  {shown} {unit}'.rstrip())
-        if difference is not None:
-            print(f'  {difference}')
+        recorded = self._recorded.get(report['values']['start_time'])
+        if recorded is not None:
+            print(f'  {_compared(report["values"], recorded)}')
+        sys.stdout.flush()
+
+
+class _Figures:
+    """
+    Draws each motion into a file of its own; `NAME` for the only one, else `NAME-1`, `NAME-2` ….
+
+    Parameters
+    ----------
+    name
+        As given, None for no figures.
+
+    """
+
+    def __init__(self, name: str | None) -> None:
+        self._name = name
+        self._first: Judgement | None = None
+        self._count = 0
+
+    def take(self, judgement: 'Judgement') -> None:
+        """Draw a motion; the first waits until there is another."""
+        if self._name is None:
+            return
+        self._count += 1
+        if self._count == 1:
+            self._first = judgement
+            return
+        if self._name == STANDARD_OUTPUT:
+            raise NotWritten('several motions are as many figures: --plot needs a name')
+        if self._first is not None:
+            self._draw(self._first, 1)
+            self._first = None
+        self._draw(judgement, self._count)
+
+    def end(self) -> None:
+        """Draw the only motion."""
+        if self._first is not None:
+            self._draw(self._first, None)
+
+    def _draw(self, judgement: 'Judgement', number: int | None) -> None:
+        """Draw a motion."""
+        # Imported here: matplotlib is an extra.
+        from flat_planner_ros.figures.analysis_figure import draw
+
+        name = str(self._name)
+        if number is not None:
+            name = str(Path(name).with_stem(f'{Path(name).stem}-{number}'))
+        drawn = partial(
+            draw,
+            judgement.report,
+            judgement.motion,
+            judgement.times,
+            judgement.positions,
+            judgement.efforts,
+        )
+        write_through(name, drawn, '.png')
+        print(f'figure: {name}', file=sys.stderr)
 
 
 def _as_dict(judgement: 'Judgement') -> dict[str, Any]:
@@ -236,40 +361,15 @@ def _as_dict(judgement: 'Judgement') -> dict[str, Any]:
     }
 
 
-def _recorded_reports(
-    recording: 'Recording', sources: 'Sources'
-) -> dict[float, Mapping[str, Any]]:
-    """Return the values of the reports that the monitor gave at the time, by start of motion."""
-    namespace = sources.plan.removesuffix(interfaces.topic_of(interfaces.PLANNER, interfaces.PLAN))
-    topic = namespace + interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
-    reports: dict[float, Mapping[str, Any]] = {}
-    for _, msg in recording.messages({topic}):
-        for status in msg.status:
-            values: dict[str, Any] = {pair.key: _value(pair.value) for pair in status.values}
-            if 'start_time' in values:
-                reports[values['start_time']] = values
-    return reports
-
-
-def _compared(
-    reports: Sequence[Mapping[str, Any]], recorded: Mapping[float, Mapping[str, Any]]
-) -> list[str | None]:
-    """Return for each report whether the one in the recording says the same, None without one."""
-    verdicts: list[str | None] = []
-    for report in reports:
-        mine, its = report['values'], recorded.get(report['values']['start_time'])
-        if its is None:
-            verdicts.append(None)
-            continue
-        worst = max((_difference(mine.get(k), its.get(k)), k) for k in {*mine, *its} - {'message'})
-        if worst[0] <= AGREEMENT:
-            verdicts.append('the recorded report says the same')
-        else:
-            verdicts.append(
-                f'the recorded report differs by {worst[0]:.1e} in {worst[1]}; it rests on '
-                f'{its.get("samples")} samples, this one on {mine.get("samples")}'
-            )
-    return verdicts
+def _compared(mine: Mapping[str, Any], its: Mapping[str, Any]) -> str:
+    """Return whether the report of the time says the same as this one."""
+    worst = max((_difference(mine.get(k), its.get(k)), k) for k in {*mine, *its} - {'message'})
+    if worst[0] <= AGREEMENT:
+        return 'the recorded report says the same'
+    return (
+        f'the recorded report differs by {worst[0]:.1e} in {worst[1]}; it rests on '
+        f'{its.get("samples")} samples, this one on {mine.get("samples")}'
+    )
 
 
 def _difference(first: Any, second: Any) -> float:
@@ -298,28 +398,6 @@ def _shown(value: bool | int | float | str) -> str:
     if isinstance(value, bool):
         return 'yes' if value else 'no'
     return f'{value:.6g}' if isinstance(value, float) else str(value)
-
-
-def _draw(judgements: Sequence['Judgement'], file: str) -> None:
-    """Draw each motion into a file of its own."""
-    # Imported here: matplotlib is an extra.
-    from flat_planner_ros.figures.analysis_figure import draw
-
-    if file == STANDARD_OUTPUT and len(judgements) > 1:
-        raise NotWritten(f'{len(judgements)} motions are as many figures: --plot needs a name')
-    for number, judgement in enumerate(judgements, 1):
-        path = Path(file)
-        name = file if len(judgements) == 1 else str(path.with_stem(f'{path.stem}-{number}'))
-        drawn = partial(
-            draw,
-            judgement.report,
-            judgement.motion,
-            judgement.times,
-            judgement.positions,
-            judgement.efforts,
-        )
-        write_through(name, drawn, '.png')
-        print(f'figure: {name}', file=sys.stderr)
 
 
 if __name__ == '__main__':

@@ -14,16 +14,19 @@
 
 """Recordings: one MCAP file as `ros2 bag` and Foxglove have it, written and read again."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from heapq import merge
+from itertools import chain, islice
 import json
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from flat_planner_ros.ros.recording.storage import (
     Entry,
-    Item,
     items,
     Note,
+    Span,
     storage_files,
     Topic,
 )
@@ -44,6 +47,10 @@ OFFERED = 'offered_qos_profiles'
 CHUNK_SIZE = 256 * 1024
 """Size of the pieces that are compressed together, before compression [bytes]."""
 
+REORDERED = 1024
+"""Messages among which they are brought into the order of time; memory does not grow with more."""
+
+_TIME = attrgetter('time')
 
 UNREADABLE = (rclpy_implementation.RMWError, ValueError, MemoryError)
 """Errors of a message that is not what its type says."""
@@ -156,6 +163,8 @@ class Recording:
     path
         MCAP file or sqlite3 bag of any name, compressed or not, complete or cut short, or a
         directory with such files.
+    advance
+        Is told while messages are read which share of a file has been read since it was last told.
 
     Attributes
     ----------
@@ -163,8 +172,10 @@ class Recording:
         Types of the topics by name.
     parameters : list[tuple]
         Parameters of nodes: time [ns since 1970], name with namespace, JSON text of the values.
+    files
+        The files in the order of their first messages.
     damage
-        What is not whole, empty for a complete recording.
+        What is not whole, as far as has been read; empty for a complete recording.
 
     Raises
     ------
@@ -173,17 +184,15 @@ class Recording:
 
     """
 
-    def __init__(self, path: Path) -> None:
-        self._files = storage_files(path)
+    def __init__(self, path: Path, advance: Callable[[float], object] = float) -> None:
+        self._advance = advance
         self._damages: list[str] = []
         self._damaged: set[tuple[str, int]] = set()
         self.topics: dict[str, str] = {}
         self.parameters: list[tuple[int, str, str]] = []
-        for item in self._items():
-            if isinstance(item, Topic):
-                self.topics[item.name] = item.kind
-            elif isinstance(item, Note) and item.name == PARAMETERS:
-                self._keep_parameters(item.values)
+        spans = {file: self._looked_through(file) for file in storage_files(path)}
+        self.files = sorted(spans, key=lambda file: spans[file])
+        self._spans = [spans[file] for file in self.files]
 
     @property
     def damage(self) -> str:
@@ -194,26 +203,76 @@ class Recording:
             damages.append(f'{len(self._damaged)} messages cannot be read, on {topics}')
         return '; '.join(damages)
 
-    def entries(self, topics: Collection[str]) -> list[Entry]:
-        """Return the messages of some topics in the order of their arrival."""
-        entries = (item for item in self._items() if isinstance(item, Entry))
-        wanted = [entry for entry in entries if entry.topic in topics]
-        return sorted(wanted, key=lambda entry: entry.time)
+    def entries(self, topics: Collection[str]) -> Iterator[Entry]:
+        """
+        Yield the messages of some topics in the order of their arrival.
+
+        One that stands more than REORDERED messages from its place in time comes out of order.
+        """
+        return chain.from_iterable(self.batches(topics))
+
+    def batches(self, topics: Collection[str]) -> Iterator[Sequence[Entry]]:
+        """Yield the messages of some topics in order, some at a time."""
+        for files in self._files_at_a_time():
+            ordered = [self._ordered(file, topics) for file in files]
+            if len(ordered) == 1:
+                yield from ordered[0]
+            else:
+                merged = merge(*map(chain.from_iterable, ordered), key=_TIME)
+                while batch := list(islice(merged, REORDERED)):
+                    yield batch
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[Entry, Any]]:
         """Yield the entries of some topics with their messages; damaged ones are counted."""
         for entry in self.entries(topics):
-            try:
-                msg = deserialize_message(entry.message, message_class(entry.kind))
-            except UNREADABLE:
-                self._damaged.add((entry.topic, entry.time))
-                continue
-            yield entry, msg
+            msg = self.read(entry)
+            if msg is not None:
+                yield entry, msg
 
-    def _items(self) -> Iterator[Item]:
-        """Yield what all files have in them."""
-        for file in self._files:
-            yield from items(file, self._complain)
+    def read(self, entry: Entry) -> Any:
+        """Return the message of an entry; None for a damaged one, which is counted."""
+        try:
+            return deserialize_message(entry.message, message_class(entry.kind))
+        except UNREADABLE:
+            self._damaged.add((entry.topic, entry.time))
+            return None
+
+    def _looked_through(self, file: Path) -> Span:
+        """Note what a file has besides messages; return when they came."""
+        spans: list[Span] = []
+        for item in items(file, (), self._complain, float):
+            if isinstance(item, Topic):
+                self.topics[item.name] = item.kind
+            elif isinstance(item, Note) and item.name == PARAMETERS:
+                self._keep_parameters(item.values)
+            elif isinstance(item, Span):
+                spans = [_joined(item, *spans)]
+        return spans[0] if spans else Span(0, 0)
+
+    def _files_at_a_time(self) -> Iterator[list[Path]]:
+        """Yield the files, those together whose messages came at the same time."""
+        together: list[Path] = []
+        until = 0
+        for file, span in zip(self.files, self._spans, strict=True):
+            if together and span.first > until:
+                yield together
+                together = []
+            together.append(file)
+            until = max(until, span.last)
+        yield together
+
+    def _ordered(self, file: Path, topics: Collection[str]) -> Iterator[list[Entry]]:
+        """Yield the messages of a file in the order of time, some at a time."""
+        waiting: list[Entry] = []
+        for item in items(file, topics, self._complain, self._advance):
+            if not isinstance(item, list):
+                continue
+            waiting += item
+            if len(waiting) >= 2 * REORDERED:
+                waiting.sort(key=_TIME)
+                yield waiting[:-REORDERED]
+                del waiting[:-REORDERED]
+        yield sorted(waiting, key=_TIME)
 
     def _complain(self, damage: str) -> None:
         """Keep a damage, once."""
@@ -229,6 +288,11 @@ class Recording:
             self._complain('parameters of a node cannot be read')
             return
         self.parameters.append(known)
+
+
+def _joined(*spans: Span) -> Span:
+    """Return the span of several."""
+    return Span(min(span.first for span in spans), max(span.last for span in spans))
 
 
 def _offer(quality: QoSProfile) -> str:

@@ -14,26 +14,30 @@
 
 """A monitor that is fed from a recording, and its reports."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import groupby
 import json
 from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, JointSample
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, SampleTable
 from flat_planner_ros.core.monitor import (
     MonitorSettings,
+    Phase,
     PlannedMotion,
     VibrationMonitor,
     VibrationReport,
 )
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
+from flat_planner_ros.ros.recording.recent_samples import RecentSamples, table_of
 from flat_planner_ros.ros.recording.recording import Recording
 from flat_planner_ros.ros.recording.storage import Entry
 from flat_planner_ros.ros.wire import conversions, stamps
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, PLAN, PLANNER, topic_of
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
+from flat_planner_ros.ros.wire.state_table import read_states
 import numpy as np
 from rclpy.parameter import Parameter
 
@@ -45,6 +49,9 @@ SILENCE = 1.001
 
 SHOWN_BEFORE = 0.1
 """Time before a motion of which samples are kept, relative to the motion [-]."""
+
+LONGEST = 600.0
+"""Duration of a motion whose time before is kept whole, at most [s]."""
 
 
 class NothingToJudge(FlatPlannerError):
@@ -142,9 +149,11 @@ def replay(
     sources: Sources,
     settings: Sequence[tuple[int, MonitorSettings]],
     remark: Callable[[str], object] = lambda text: None,
-) -> list[Judgement]:
+    other: Callable[[Entry], object] = lambda entry: None,
+    topics: Collection[str] = (),
+) -> Iterator[Judgement]:
     """
-    Return a report on each motion that a recording shows, as the monitor node makes it.
+    Yield a report on each motion that a recording shows, as the monitor node makes it.
 
     Parameters
     ----------
@@ -156,16 +165,31 @@ def replay(
         At least one; each holds from its time on [ns], the first from the start.
     remark
         Is told what is remarkable about the joint states, each once.
+    other, topics
+        Is given the entries of these topics, in the order of time with the others.
 
     """
-    player = _Player(settings[0][1], remark)
-    changes = list(settings[1:])
-    for entry, msg in recording.messages({sources.plan, sources.joint_states}):
-        while changes and changes[0][0] <= entry.time:
-            player.apply(changes.pop(0)[1])
-        player.take(entry, msg)
-    player.end()
-    return player.judgements
+    player = _Player(recording, settings, remark)
+    own = {sources.plan, sources.joint_states}
+    for entries in _stretches(recording.batches({*own, *topics})):
+        if entries[0].topic in own:
+            yield from player.take(entries)
+        else:
+            for entry in entries:
+                other(entry)
+    yield from player.end()
+
+
+def _stretches(batches: Iterator[Sequence[Entry]]) -> Iterator[list[Entry]]:
+    """Yield entries of one topic and one length that come one after the other."""
+    for batch in batches:
+        for _, alike in groupby(batch, _form):
+            yield list(alike)
+
+
+def _form(entry: Entry) -> tuple[str, int]:
+    """Return what entries that are looked at together have in common."""
+    return entry.topic, len(entry.message)
 
 
 class _Player:
@@ -175,34 +199,75 @@ class _Player:
     A recorder may have been late where the joint states were not.
     """
 
-    def __init__(self, settings: MonitorSettings, remark: Callable[[str], object]) -> None:
-        self.monitor = VibrationMonitor(settings)
+    def __init__(
+        self,
+        recording: Recording,
+        settings: Sequence[tuple[int, MonitorSettings]],
+        remark: Callable[[str], object],
+    ) -> None:
+        self.monitor = VibrationMonitor(settings[0][1])
+        self._changes = list(settings[1:])
+        self._recording = recording
         self._remark = remark
-        self.judgements: list[Judgement] = []
         self._stamp: float | None = None
         self._reader: JointStateReader | None = None
         self._motions: list[PlannedMotion] = []
-        self._samples: list[JointSample] = []
+        self._samples = RecentSamples()
 
-    def apply(self, settings: MonitorSettings) -> None:
+    def take(self, entries: Sequence[Entry]) -> Iterator[Judgement]:
+        """Take messages of one topic and one length; those that cannot be used are left out."""
+        is_changed = bool(self._changes) and self._changes[0][0] <= entries[-1].time
+        table = None
+        if len(entries) > 1 and entries[0].kind == JOINT_STATE and not is_changed:
+            table = self._table(entries)
+        if table is None:
+            for entry in entries:
+                yield from self._take_one(entry)
+        else:
+            yield from self._take_table(table, [entry.time / NANOSECONDS for entry in entries])
+
+    def end(self) -> Iterator[Judgement]:
+        """Judge a motion that is still watched: nothing more will come."""
+        if self._stamp is not None:
+            silence = SILENCE * self.monitor.settings.timeout
+            yield from self._judged(self.monitor.tick(self._stamp + silence))
+
+    def _take_one(self, entry: Entry) -> Iterator[Judgement]:
+        """Take a message with the settings of its time."""
+        while self._changes and self._changes[0][0] <= entry.time:
+            self._apply(self._changes.pop(0)[1])
+        msg = self._recording.read(entry)
+        if msg is None:
+            return
+        take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
+        with suppress(FlatPlannerError):
+            yield from take(msg, entry.time / NANOSECONDS)
+
+    def _apply(self, settings: MonitorSettings) -> None:
         """Judge with changed settings from now on."""
         self.monitor.settings = settings
         if self._reader is not None:
             self._reader.rules = settings.joint_states
 
-    def take(self, entry: Entry, msg: Any) -> None:
-        """Take a message; one that cannot be used is left out, as in the node."""
-        take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
-        with suppress(FlatPlannerError):
-            take(msg, entry.time / NANOSECONDS)
+    def _table(self, entries: Sequence[Entry]) -> SampleTable | None:
+        """Return joint states as a table, None where they must be looked at one by one."""
+        if self._reader is None:
+            return None
+        states = read_states([entry.message for entry in entries])
+        return None if states is None else self._reader.read_table(*states)
 
-    def end(self) -> None:
-        """Judge a motion that is still watched: nothing more will come."""
-        if self._stamp is not None:
-            silence = SILENCE * self.monitor.settings.timeout
-            self._keep(self.monitor.tick(self._stamp + silence))
+    def _take_table(self, samples: SampleTable, arrivals: Sequence[float]) -> Iterator[Judgement]:
+        """Take joint states that arrived then [s]."""
+        heard = np.array(arrivals)
+        while len(samples):
+            taken, reports = self.monitor.add_table(samples, heard)
+            self._samples.add(samples.rows(slice(taken)))
+            self._stamp = float(samples.times[taken - 1])
+            yield from self._judged(reports)
+            samples, heard = samples.rows(slice(taken, None)), heard[taken:]
+        self._forget_old()
 
-    def _take_plan(self, msg: Any, arrival: float) -> None:
+    def _take_plan(self, msg: Any, arrival: float) -> Iterator[Judgement]:
         """Take a plan that arrived then [s], for whatever joints it names."""
         if not stamps.is_stamped(msg):
             msg.header.stamp = stamps.time_msg(arrival)
@@ -210,12 +275,15 @@ class _Player:
         if self._reader is None or tuple(self._reader.joints) != motion.joint_names:
             self.monitor.reset()
             self._reader = JointStateReader(motion.joint_names, self.monitor.settings.joint_states)
-            self._samples.clear()
+            self._samples = RecentSamples()
         self._reader.align(motion.positions[0])
         self._motions.append(motion)
-        self._keep(self.monitor.watch(motion, arrival))
+        yield from self._judged(self.monitor.watch(motion, arrival))
+        started = self.monitor.motion
+        if started is not None:
+            self._motions = [each for each in self._motions if each.start >= started.start]
 
-    def _take_state(self, msg: Any, arrival: float) -> None:
+    def _take_state(self, msg: Any, arrival: float) -> Iterator[Judgement]:
         """Take a joint state that arrived then [s]."""
         if self._reader is None:
             return
@@ -223,35 +291,38 @@ class _Player:
             self.monitor.hear(stamps.seconds(msg.header.stamp), arrival)
         for sample in self._reader.read(msg, lambda: arrival):
             self._stamp = sample.time
-            self._samples.append(sample)
-            self._keep(self.monitor.add(sample))
+            self._samples.add(table_of(sample))
+            yield from self._judged(self.monitor.add(sample))
+        self._forget_old()
         for text in self._reader.take_remarks():
             self._remark(text)
 
-    def _keep(self, reports: Sequence[VibrationReport]) -> None:
-        """Keep reports, each with its motion and samples."""
+    def _judged(self, reports: Sequence[VibrationReport]) -> Iterator[Judgement]:
+        """Yield reports, each with its motion and samples."""
         for report in reports:
             motion = next(m for m in reversed(self._motions) if m.start == report.start_time)
-            self.judgements.append(self._judgement(report, motion))
-            ahead = report.clock_offset or 0.0
+            yield self._judgement(report, motion)
             # The next motion needs what came since this one began, at most.
-            self._samples = [
-                sample for sample in self._samples if sample.time - ahead >= motion.start
-            ]
+            self._samples.forget(motion.start + (report.clock_offset or 0.0))
+
+    def _forget_old(self) -> None:
+        """Forget samples that no figure will show."""
+        if self._stamp is not None and self.monitor.phase in (Phase.IDLE, Phase.DONE):
+            self._samples.forget(self._stamp - SHOWN_BEFORE * LONGEST)
 
     def _judgement(self, report: VibrationReport, motion: PlannedMotion) -> Judgement:
         """Return a report with its motion and the samples around it."""
         ahead = report.clock_offset or 0.0
         first = motion.start - SHOWN_BEFORE * (motion.end - motion.start)
         last = motion.end + self.monitor.settings.window
-        shown = [sample for sample in self._samples if first <= sample.time - ahead <= last]
-        unknown = np.full(len(motion.joint_names), np.nan)
+        shown = self._samples.between(first + ahead, last + ahead, len(motion.joint_names))
+        efforts = np.full_like(shown.positions, np.nan) if shown.efforts is None else shown.efforts
         return Judgement(
             report=report,
             motion=motion,
-            times=np.array([sample.time - ahead for sample in shown]),
-            positions=np.array([sample.positions for sample in shown]),
-            efforts=np.array([unknown if s.efforts is None else s.efforts for s in shown]),
+            times=shown.times - ahead,
+            positions=shown.positions,
+            efforts=efforts,
         )
 
 

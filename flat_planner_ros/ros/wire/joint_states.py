@@ -24,6 +24,7 @@ from flat_planner_ros.core.arm import (
     JointMerger,
     JointSample,
     JointStateRules,
+    SampleTable,
     TurnCounter,
 )
 from flat_planner_ros.core.monitor import joint_indices
@@ -177,6 +178,37 @@ class JointStateReader:
             f'joint_states.tolerance {self.rules.tolerance:g} s'
         )
         return self._merger.add(part, sample)
+
+    def read_table(self, names: list[str], samples: SampleTable) -> SampleTable | None:
+        """
+        Return the states of the arm's joints in messages that all have the same joints.
+
+        Parameters
+        ----------
+        names
+            Joints in the messages.
+        samples
+            Their states, stamped.
+
+        Returns
+        -------
+        SampleTable or None
+            None, and nothing is taken, where the messages are to be read one by one.
+
+        """
+        if names != self._names:
+            return None  # the first of them is to be read by itself
+        places, part, counter = self._layout
+        if part is not None:
+            return None
+        chosen = samples.joints(places)
+        if self._rules.unwrap:
+            turned = counter.unwrapped_table(chosen)
+            if turned is None:
+                return None
+            chosen = turned
+        self._whole = float(chosen.times[-1])
+        return chosen
 
     def align(self, pose: FloatArray) -> None:
         """

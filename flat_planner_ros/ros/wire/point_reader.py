@@ -20,24 +20,15 @@ table of numbers where all points have arrays of equal lengths. Whatever is not 
 form is left to the middleware.
 """
 
-from struct import Struct, unpack_from
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, LENGTH, ORDERS, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
 import numpy as np
 
 FIELDS = ('positions', 'velocities', 'accelerations', 'effort')
 """Arrays of a point in the order of the message."""
-
-ORDERS = {b'\0\0': '>', b'\0\1': '<'}
-"""Byte order by the representation that a message states: plain CDR, big or little endian."""
-
-HEADER = 4
-"""Bytes of the encapsulation; offsets count from its end."""
-
-LENGTH, DOUBLE = 4, 8
-"""Bytes of a sequence's length and of a number; each is aligned to its own size."""
 
 
 def joints_in_words(count: int) -> str:
@@ -88,10 +79,6 @@ class PointTable(NamedTuple):
         return self.table(field)
 
 
-class _Unusual(Exception):
-    """The message is not of the form that is read here."""
-
-
 def read_points(data: bytes) -> PointTable | None:
     """
     Return a trajectory from its bytes; None if only the middleware can tell what they mean.
@@ -106,7 +93,7 @@ def read_points(data: bytes) -> PointTable | None:
     order = ORDERS.get(data[:2])
     if order is None:
         return None
-    front = _Front(data, order)
+    front = Front(data, order)
     try:
         stamp = front.stamp()
         front.string()
@@ -115,8 +102,8 @@ def read_points(data: bytes) -> PointTable | None:
         if not count:
             return None
         start = front.at
-        widths = front.widths()
-    except _Unusual:
+        widths = [width for _, width in front.numbers(ARRAYS)]
+    except Unusual:
         return None
     first = point_type(start, widths, order)
     other = point_type(start + first.itemsize, widths, order)
@@ -138,73 +125,3 @@ def read_points(data: bytes) -> PointTable | None:
         for field, (name, width) in enumerate(zip(FIELDS, widths, strict=True))
     }
     return PointTable(names, stamp, times, fields, misfits={})
-
-
-class _Front:
-    """
-    Reads what stands before the points, checking every length against what is left.
-
-    Parameters
-    ----------
-    data
-        The message.
-    order
-        Byte order of the message.
-
-    Attributes
-    ----------
-    at
-        Offset of the next entry from the end of the encapsulation.
-
-    """
-
-    def __init__(self, data: bytes, order: str) -> None:
-        self._data = data
-        self._length = Struct(f'{order}I')
-        self._stamp = f'{order}iI'
-        self.at = 0
-
-    def stamp(self) -> float:
-        """Return the stamp of the header [s]."""
-        begin = self._taken(2 * LENGTH)
-        sec, nanosec = unpack_from(self._stamp, self._data, begin)
-        return float(sec + nanosec / NANOSECONDS)
-
-    def length(self, size: int) -> int:
-        """Return the length of a sequence whose entries take at least some bytes each."""
-        self.at += -self.at % LENGTH
-        (entry,) = self._length.unpack_from(self._data, self._taken(LENGTH))
-        length = int(entry)
-        if length * size > len(self._data):
-            raise _Unusual
-        return length
-
-    def string(self) -> str:
-        """Return a string; it ends with its only zero."""
-        length = self.length(1)
-        begin = self._taken(length)
-        text = self._data[begin : begin + length]
-        if text.find(0) != length - 1:
-            raise _Unusual
-        try:
-            return text[:-1].decode()
-        except UnicodeDecodeError:
-            raise _Unusual from None
-
-    def widths(self) -> list[int]:
-        """Return the lengths of the arrays of a point that begins here."""
-        widths = []
-        for _ in range(ARRAYS):
-            widths.append(self.length(DOUBLE))
-            if widths[-1]:
-                self.at += -self.at % DOUBLE
-                self._taken(DOUBLE * widths[-1])
-        return widths
-
-    def _taken(self, size: int) -> int:
-        """Return where the next bytes begin in the message and go past them."""
-        begin = HEADER + self.at
-        if begin + size > len(self._data):
-            raise _Unusual
-        self.at += size
-        return begin

@@ -1,0 +1,102 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Serialised messages: the part before their numbers, read with every length checked."""
+
+from struct import Struct, unpack_from
+
+from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
+
+ORDERS = {b'\0\0': '>', b'\0\1': '<'}
+"""Byte order by the representation that a message states: plain CDR, big or little endian."""
+
+HEADER = 4
+"""Bytes of the encapsulation; offsets count from its end."""
+
+LENGTH, DOUBLE = 4, 8
+"""Bytes of a sequence's length and of a number; each is aligned to its own size."""
+
+
+class Unusual(Exception):
+    """The message is not of the form that is read here."""
+
+
+class Front:
+    """
+    Reads what stands before the points, checking every length against what is left.
+
+    Parameters
+    ----------
+    data
+        The message.
+    order
+        Byte order of the message.
+
+    Attributes
+    ----------
+    at
+        Offset of the next entry from the end of the encapsulation.
+
+    """
+
+    def __init__(self, data: bytes, order: str) -> None:
+        self._data = data
+        self._length = Struct(f'{order}I')
+        self._stamp = f'{order}iI'
+        self.at = 0
+
+    def stamp(self) -> float:
+        """Return the stamp of the header [s]."""
+        begin = self.taken(2 * LENGTH)
+        sec, nanosec = unpack_from(self._stamp, self._data, begin)
+        return float(sec + nanosec / NANOSECONDS)
+
+    def length(self, size: int) -> int:
+        """Return the length of a sequence whose entries take at least some bytes each."""
+        self.at += -self.at % LENGTH
+        (entry,) = self._length.unpack_from(self._data, self.taken(LENGTH))
+        length = int(entry)
+        if length * size > len(self._data):
+            raise Unusual
+        return length
+
+    def string(self) -> str:
+        """Return a string; it ends with its only zero."""
+        length = self.length(1)
+        begin = self.taken(length)
+        text = self._data[begin : begin + length]
+        if text.find(0) != length - 1:
+            raise Unusual
+        try:
+            return text[:-1].decode()
+        except UnicodeDecodeError:
+            raise Unusual from None
+
+    def numbers(self, arrays: int) -> list[tuple[int, int]]:
+        """Return where each of some arrays of numbers begins in the message, and its length."""
+        places = []
+        for _ in range(arrays):
+            width = self.length(DOUBLE)
+            if width:
+                self.at += -self.at % DOUBLE
+            places.append((self.taken(DOUBLE * width), width))
+        return places
+
+    def taken(self, size: int) -> int:
+        """Return where the next bytes begin in the message and go past them."""
+        begin = HEADER + self.at
+        if begin + size > len(self._data):
+            raise Unusual
+        self.at += size
+        return begin
