@@ -51,6 +51,8 @@ setup(
             'ros-jazzy-trajectory-msgs==5.3.6',
         ],
         'record': ['mcap>=1.6,<2', 'zstandard>=0.22,<1'],
+        # How far long computations have come, on a terminal.
+        'progress': ['tqdm>=4.60,<5'],
         'live': ['aiohttp>=3.9,<4'],
         # Completion of the programs' options in a shell.
         'complete': ['argcomplete>=3,<4'],

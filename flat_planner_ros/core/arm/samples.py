@@ -103,7 +103,7 @@ class SampleTable:
             efforts=None if self.efforts is None else self.efforts[row],
         )
 
-    def rows(self, rows: slice | NDArray[np.bool_]) -> 'SampleTable':
+    def rows(self, rows: slice | NDArray[np.intp]) -> 'SampleTable':
         """Return some of the samples."""
         return SampleTable(
             times=self.times[rows],

@@ -18,7 +18,7 @@ Effort against residual: what a motion leaves behind, what others would, and wha
 Nothing here is simulated: every residual is an integral over the effort (`insensitive.residual`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from flat_planner_ros.core.arm import (
@@ -242,6 +242,7 @@ def tradeoff_points(
     *,
     stretches: Sequence[float] = (1.0, 1.1, 1.25, 1.5),
     weights: Sequence[float] = WEIGHTS,
+    advance: Callable[[float], object] = float,
 ) -> tuple[TradeoffPoint, ...]:
     """
     Return effort and residual of strategies, baselines and sweeps of `insensitive`.
@@ -256,6 +257,8 @@ def tradeoff_points(
         Durations of the sweeps, over that of the request [-].
     weights
         Of the sweeps [-].
+    advance
+        Is told which share of the sweeps has been computed since it was last told.
 
     Raises
     ------
@@ -273,6 +276,7 @@ def tradeoff_points(
         stretched = replace(request, duration=stretch * request.duration)
         for nominal in Nominal:
             points += _sweep(stretched, arm, options, nominal, weights)
+            advance(1.0 / (len(stretches) * len(Nominal)))
     return tuple(points)
 
 

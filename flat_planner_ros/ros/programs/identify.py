@@ -32,6 +32,7 @@ from flat_planner_ros.ros.programs.command_line import (
     parsed,
 )
 from flat_planner_ros.ros.programs.outputs import summary_stream, write_through
+from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.wire import interfaces
 
 
@@ -59,12 +60,14 @@ def main(args: Sequence[str] | None = None) -> int:
         settings = read_settings(
             options.params_file, planner_parameters.ROWS, planner_parameters.build, node=node
         ).session
-        found = measured(
-            options.files,
-            settings.joints,
-            namespace=options.namespace,
-            topic=options.joint_states,
-        )
+        with progress(len(options.files), 'identify') as advance:
+            found = measured(
+                options.files,
+                settings.joints,
+                namespace=options.namespace,
+                topic=options.joint_states,
+                advance=advance,
+            )
         fit = fit_model(found, settings.arm, trust=Trust(options.trust))
         print(fit.text, file=summary_stream(options.output, options.plot))
         if options.plot is not None:

@@ -50,6 +50,7 @@ from flat_planner_ros.ros.programs.paper_experiment import (
     Interrupted,
     refuse_company,
 )
+from flat_planner_ros.ros.programs.progress import progress
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -200,9 +201,11 @@ def _results(
             print('starting the three nodes ...', flush=True)
             experimenter.wait_for_nodes()
             print(HEADER, flush=True)
-            for scenario, method in cases:
-                results.append(experimenter.run(scenario, method))
-                print(_row(results[-1]), flush=True)
+            with progress(len(cases), 'paper_table') as advance:
+                for scenario, method in cases:
+                    results.append(experimenter.run(scenario, method))
+                    advance(1)
+                    print(_row(results[-1]), flush=True)
         finally:
             experimenter.destroy_node()
     return results

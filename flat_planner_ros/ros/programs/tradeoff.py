@@ -47,6 +47,7 @@ from flat_planner_ros.ros.programs.command_line import (
     pose_of,
 )
 from flat_planner_ros.ros.programs.outputs import open_text, summary_stream, write_through
+from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.wire import interfaces
 
 STRETCHES = (1.0, 1.1, 1.25, 1.5)
@@ -190,7 +191,9 @@ def _points(
     if options.max_effort is not None:
         fastest = fastest_points(request, arm, wanted, options.max_effort)
     text = str(planning.insensitivity.box).replace('+-', '±')
-    return tradeoff_points(request, arm, wanted, stretches=options.stretch), fastest, text
+    with progress(1.0, 'tradeoff') as advance:
+        points = tradeoff_points(request, arm, wanted, stretches=options.stretch, advance=advance)
+    return points, fastest, text
 
 
 def _print(points: Sequence[TradeoffPoint], box: str) -> None:

@@ -14,17 +14,27 @@
 
 """Angles and efforts of an arm from recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, JointSample
+from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, SampleTable
 from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.ros.recording.recent_samples import (
+    joined,
+    nothing,
+    table_of,
+    with_efforts,
+)
 from flat_planner_ros.ros.recording.recording import Recording
-from flat_planner_ros.ros.recording.replay import find_topic, JOINT_STATE
+from flat_planner_ros.ros.recording.replay import find_topic, JOINT_STATE, stretches
+from flat_planner_ros.ros.recording.storage import Entry
 from flat_planner_ros.ros.wire.interfaces import JOINT_STATES
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
+from flat_planner_ros.ros.wire.state_table import read_states
 import numpy as np
 
 APART = 10.0
@@ -36,7 +46,12 @@ class NothingMeasured(FlatPlannerError):
 
 
 def measured(
-    paths: Sequence[Path], joints: Sequence[str], *, namespace: str = '', topic: str = ''
+    paths: Sequence[Path],
+    joints: Sequence[str],
+    *,
+    namespace: str = '',
+    topic: str = '',
+    advance: Callable[[float], object] = float,
 ) -> Measurements:
     """
     Return what recordings show of an arm, one after the other with a gap between them.
@@ -49,6 +64,8 @@ def measured(
         Names, the passive joint last.
     namespace, topic
         Of the joint states, where a recording has several.
+    advance
+        Is told which share of a file has been read since it was last told.
 
     Raises
     ------
@@ -58,47 +75,51 @@ def measured(
         A recording cannot be read or has no joint states.
 
     """
-    times: list[float] = []
-    positions: list[FloatArray] = []
-    efforts: list[FloatArray] = []
+    parts: list[SampleTable] = []
     for path in paths:
-        samples = _samples(Recording(path), joints, namespace, topic)
-        if not samples:
+        samples = _samples(Recording(path, advance), joints, namespace, topic)
+        if not len(samples):
             raise NothingMeasured(
                 f'{path} has no joint states of {", ".join(joints)} with efforts: the driver must '
                 'report what its motors apply'
             )
         # Each recording has a time of its own.
-        shift = (times[-1] + APART if times else 0.0) - samples[0].time
-        times += [sample.time + shift for sample in samples]
-        positions += [sample.positions for sample in samples]
-        efforts += [sample.efforts[:-1] for sample in samples if sample.efforts is not None]
-    return Measurements(
-        times=np.array(times), positions=np.array(positions), efforts=np.array(efforts)
-    )
+        begin = parts[-1].times[-1] + APART if parts else 0.0
+        parts.append(replace(samples, times=samples.times - samples.times[0] + begin))
+    whole = joined(parts)
+    efforts = np.empty_like(whole.positions) if whole.efforts is None else whole.efforts
+    return Measurements(times=whole.times, positions=whole.positions, efforts=efforts[:, :-1])
 
 
 def _samples(
     recording: Recording, joints: Sequence[str], namespace: str, topic: str
-) -> list[JointSample]:
+) -> SampleTable:
     """Return the complete samples of a recording in the order of their stamps."""
     name = find_topic(recording, JOINT_STATE, topic, namespace, JOINT_STATES, '--joint-states')
     reader = JointStateReader(joints)
-    samples: list[JointSample] = []
-    for entry, msg in recording.messages({name}):
-        try:
-            found = reader.read(msg, partial(float, entry.time / NANOSECONDS))
-        except InvalidRequest:
-            continue  # none of the joints, as several drivers on one topic send it
-        for sample in found:
-            is_later = not samples or sample.time > samples[-1].time
-            if is_later and _is_complete(sample):
-                samples.append(sample)
-    return samples
+    parts = [with_efforts(nothing(len(joints)))]
+    for entries in stretches(recording.batches({name})):
+        states = read_states([entry.message for entry in entries])
+        table = None if states is None else reader.read_table(*states)
+        found = _read_singly(recording, reader, entries) if table is None else [table]
+        parts += map(with_efforts, found)
+    samples = joined(parts)
+    efforts = np.empty_like(samples.positions) if samples.efforts is None else samples.efforts
+    known = np.isfinite(np.hstack((samples.positions, efforts[:, :-1])))
+    samples = samples.rows(np.flatnonzero(known.all(axis=1)))
+    latest = np.maximum.accumulate(samples.times)
+    is_later = np.append(True, samples.times[1:] > latest[:-1])[: len(samples)]
+    return samples.rows(np.flatnonzero(is_later))
 
 
-def _is_complete(sample: JointSample) -> bool:
-    """Tell a sample with all angles and the efforts of all motors."""
-    return sample.efforts is not None and bool(
-        np.isfinite(sample.positions).all() and np.isfinite(sample.efforts[:-1]).all()
-    )
+def _read_singly(
+    recording: Recording, reader: JointStateReader, entries: Sequence[Entry]
+) -> Iterator[SampleTable]:
+    """Yield the samples in messages that are not alike."""
+    for entry in entries:
+        msg = recording.read(entry)
+        arrival = partial(float, entry.time / NANOSECONDS)
+        # None of the joints, as several drivers on one topic send it, is no error.
+        with suppress(InvalidRequest):
+            if msg is not None:
+                yield from map(table_of, reader.read(msg, arrival))

@@ -29,12 +29,9 @@ class RecentSamples:
 
     def add(self, samples: SampleTable) -> None:
         """Keep some more."""
-        efforts = samples.efforts
-        if efforts is None:
-            efforts = np.full_like(samples.positions, np.nan)
-        part = SampleTable(times=samples.times, positions=samples.positions, efforts=efforts)
+        part = with_efforts(samples)
         if self._parts and len(self._parts[-1]) + len(part) <= PART:
-            part = _joined([self._parts.pop(), part])
+            part = joined([self._parts.pop(), part])
         self._parts.append(part)
 
     def forget(self, until: float) -> None:
@@ -47,10 +44,20 @@ class RecentSamples:
     def between(self, first: float, last: float, joints: int) -> SampleTable:
         """Return the samples of a time [s], of so many joints."""
         parts = [_chosen(part, first, last) for part in self._parts]
-        nothing = np.empty((0, joints))
-        return _joined(
-            [SampleTable(times=np.empty(0), positions=nothing, efforts=nothing), *parts]
-        )
+        return joined([with_efforts(nothing(joints)), *parts])
+
+
+def nothing(joints: int) -> SampleTable:
+    """Return no samples of so many joints."""
+    return SampleTable(times=np.empty(0), positions=np.empty((0, joints)))
+
+
+def with_efforts(samples: SampleTable) -> SampleTable:
+    """Return samples without velocities, with NaN for efforts that they do not have."""
+    efforts = samples.efforts
+    if efforts is None:
+        efforts = np.full_like(samples.positions, np.nan)
+    return SampleTable(times=samples.times, positions=samples.positions, efforts=efforts)
 
 
 def table_of(sample: JointSample) -> SampleTable:
@@ -65,10 +72,10 @@ def table_of(sample: JointSample) -> SampleTable:
 
 def _chosen(samples: SampleTable, first: float, last: float) -> SampleTable:
     """Return the samples of a time [s]."""
-    return samples.rows((samples.times >= first) & (samples.times <= last))
+    return samples.rows(np.flatnonzero((samples.times >= first) & (samples.times <= last)))
 
 
-def _joined(parts: list[SampleTable]) -> SampleTable:
+def joined(parts: list[SampleTable]) -> SampleTable:
     """Return samples that have efforts, one after the other."""
     return SampleTable(
         times=np.concatenate([part.times for part in parts]),

@@ -171,7 +171,7 @@ def replay(
     """
     player = _Player(recording, settings, remark)
     own = {sources.plan, sources.joint_states}
-    for entries in _stretches(recording.batches({*own, *topics})):
+    for entries in stretches(recording.batches({*own, *topics})):
         if entries[0].topic in own:
             yield from player.take(entries)
         else:
@@ -180,7 +180,7 @@ def replay(
     yield from player.end()
 
 
-def _stretches(batches: Iterator[Sequence[Entry]]) -> Iterator[list[Entry]]:
+def stretches(batches: Iterator[Sequence[Entry]]) -> Iterator[list[Entry]]:
     """Yield entries of one topic and one length that come one after the other."""
     for batch in batches:
         for _, alike in groupby(batch, _form):

@@ -304,7 +304,7 @@ def test_a_signal_ends_the_recording_in_order(graph, tmp_path, number):
     assert '10 messages on 1 topics' in process.stdout
     recording = Recording(path)
     assert recording.damage == ''
-    assert len(recording.entries({'/joint_states'})) == 10
+    assert len(list(recording.entries({'/joint_states'}))) == 10
 
 
 def test_a_killed_recorder_leaves_a_file_that_can_be_read(graph, tmp_path):
@@ -314,20 +314,20 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_read(graph, tmp_path):
 
     def is_flushed() -> bool:
         with suppress(UnreadableRecording):  # not even its head is written yet
-            return len(Recording(path).entries({'/joint_states'})) == 10
+            return len(list(Recording(path).entries({'/joint_states'}))) == 10
         return False
 
     graph.expect(is_flushed, 'messages in the file')
     process.kill()
     recording = Recording(path)
-    assert len(recording.entries({'/joint_states'})) == 10
+    assert len(list(recording.entries({'/joint_states'}))) == 10
     assert recording.damage
     # Also if the last piece was being written.
     torn = tmp_path / 'torn.mcap'
     torn.write_bytes(path.read_bytes()[:-7])
     recording = Recording(torn)
     assert recording.topics == {'/joint_states': 'sensor_msgs/msg/JointState'} or not (
-        recording.entries({'/joint_states'})
+        list(recording.entries({'/joint_states'}))
     )
     assert recording.damage
 
