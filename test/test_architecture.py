@@ -326,7 +326,7 @@ def test_what_is_imported_is_declared():
     declared |= set().union(
         *(
             distributions(setup_arguments()['extras_require'][extra])
-            for extra in ('record', 'live', 'complete')
+            for extra in ('record', 'live', 'complete', 'progress')
         )
     )
     used = set().union(*map(roots, [*PACKAGE.rglob('*.py'), *CHECKOUT.glob('launch/*.py')]))
