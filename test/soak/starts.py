@@ -33,7 +33,7 @@ import numpy as np
 from rclpy.qos import QoSProfile
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from flat_planner_ros.ros.wire import stamps  # noqa: E402
+from flat_planner_ros.ros.wire import stamps  # noqa: E402, I100
 from ros.conftest import free_domain, Graph, Process  # noqa: E402  From the directory of tests.
 from ros.rig import GOAL, goal, NODES, STATES  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
