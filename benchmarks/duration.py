@@ -54,7 +54,7 @@ STRATEGIES = (
     Strategy.MIXED,
     Strategy.MIN_PEAK_EFFORT,
 )
-"""Those whose law is known in closed form, with the weights 150 and 17, and the fastest."""
+"""Those whose law is known in closed form, with their default weights, and the fastest."""
 
 STEP = 1e-3
 """Difference of two distances, so that no duration tried is known from before [rad]."""

@@ -54,7 +54,9 @@ _CROWDED = np.outer([0.0, 49.0**2, 0.0, -98.0, 0.0, 1.0], [0.0, 49.0**2, 0.0, -9
 
 COSTS = {
     'polynomial': PlanningOptions(strategy=Strategy.POLYNOMIAL),
-    'min potential energy, p = 17': PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY),
+    'min potential energy, p = 17': PlanningOptions(
+        strategy=Strategy.MIN_POTENTIAL_ENERGY, p=17.0
+    ),
     'mixed': PlanningOptions(strategy=Strategy.MIXED),
     'min control effort, r = 30: twelve roots around zero': PlanningOptions(
         strategy=Strategy.MIN_CONTROL_EFFORT, r=30.0

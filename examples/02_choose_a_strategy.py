@@ -50,7 +50,7 @@ figure, (torque, swing) = plt.subplots(2, 1, figsize=(7.0, 6.0))
 efforts, residuals = {}, {}
 print(f'{"strategy":22} RMS torque [mN m]  left on a 10 % stiffer arm [rad]')
 for strategy in strategies:
-    motion = plan(request, arm, PlanningOptions(strategy=strategy, r=150.0, p=17.0))
+    motion = plan(request, arm, PlanningOptions(strategy=strategy))
     samples = motion.sample(0.005)
     command = EffortProfile(start=0.0, times=samples.times, efforts=samples.efforts[:, :-1])
     played = rollout(stiffer, command, until=3.0)

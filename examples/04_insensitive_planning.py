@@ -44,9 +44,7 @@ box = UncertaintyBox(stiffness=0.1, damping=0.5)
 least = plan(
     request,
     arm,
-    PlanningOptions(
-        strategy=Strategy.MIN_CONTROL_EFFORT, r=150.0, insensitivity=Insensitivity(box=box)
-    ),
+    PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, insensitivity=Insensitivity(box=box)),
 )
 insensitive = plan(
     request,

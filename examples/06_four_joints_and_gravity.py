@@ -56,7 +56,7 @@ limits = JointLimits.of(
     effort=np.array([20.0, 8.0, 0.5, np.inf]),
 )
 request = MotionRequest(start=(0.4, 0.5, -0.3, 0.0), final=(1.6, -0.6, 0.8, 0.0), duration=1.0)
-options = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, r=60.0)
+options = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, effort_weight=1.55)
 motion = shortest_plan(
     lambda duration: plan(request.stretched(duration), arm, options),
     limits,

@@ -46,7 +46,7 @@ arm = PlanarArm.reduced(
     stiffness=0.25,
     damping=3.3e-4,
 )
-options = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, r=60.0)
+options = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, effort_weight=1.55)
 points = [(0.8, 0.6), (1.2, -0.2), (2.4, 0.5)]  # last link's angle, joint 1 [rad]
 evenly = MotionRequest(
     start=(0.0, 0.0, 0.0),

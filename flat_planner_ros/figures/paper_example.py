@@ -69,6 +69,10 @@ STRATEGIES = ('polynomial', 'min_control_effort', 'min_potential_energy')
 """In the order of the paper's table, named as the planner's parameter `strategy`."""
 
 
+WEIGHTS = {'weights.r': 150.0, 'weights.p': 17.0}
+"""The paper's weights of effort and potential energy."""
+
+
 class Method(NamedTuple):
     """
     One way to plan the motion.
@@ -77,7 +81,7 @@ class Method(NamedTuple):
     ----------
     name
         Name in the table.
-    parameters : Mapping[str, str]
+    parameters : Mapping[str, str | float]
         Values of the planner's parameters.
     learns
         Whether the row is the second of two motions, after the estimate from the first has been
@@ -86,14 +90,14 @@ class Method(NamedTuple):
     """
 
     name: str
-    parameters: Mapping[str, str]
+    parameters: Mapping[str, str | float]
     learns: bool = False
 
 
 def _method(name: str, strategy: str, flat_model: str, learns: bool = False) -> Method:
     """Return a method."""
-    parameters = MappingProxyType({'strategy': strategy, 'flat_model': flat_model})
-    return Method(name, parameters, learns)
+    parameters: dict[str, str | float] = {'strategy': strategy, 'flat_model': flat_model}
+    return Method(name, MappingProxyType(parameters | WEIGHTS), learns)
 
 
 METHODS = tuple(_method(strategy, strategy, 'approximate') for strategy in STRATEGIES)

@@ -16,7 +16,6 @@
 
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.cost import (
-    MAX_WEIGHT,
     QuadraticCost,
     Strategy,
     strategy_cost,
@@ -49,7 +48,6 @@ __all__ = [
     'JET_ORDER',
     'Law',
     'MAX_DERIVATIVE',
-    'MAX_WEIGHT',
     'motion_quadrature',
     'optimal_path',
     'PathConditions',

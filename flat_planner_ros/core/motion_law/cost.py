@@ -37,11 +37,11 @@ WEIGHT_EXPONENT = 8
 MAX_FACTOR = 1e100
 """Largest factor of a derivative in a cost; its square and sums of squares still have room."""
 
+MAX_ROOT = MAX_FACTOR ** (2.0 / WEIGHT_EXPONENT)
+"""Largest r or p, whose fourth power is a factor: no arm asks for a millionth of it."""
+
 MAX_ENTRY = MAX_FACTOR**2
 """Largest entry of a cost's Q; sums of several still have room."""
-
-MAX_WEIGHT = 1000.0
-"""Largest r or p accepted: beyond, weight**8 times the arm's data may leave double precision."""
 
 SEMIDEFINITE_TOLERANCE = 1e-10
 """Most negative eigenvalue of a positive-semidefinite Q scaled to unit diagonal [-]."""
@@ -244,7 +244,7 @@ def strategy_cost(
     Raises
     ------
     InvalidCost
-        A weight outside [0, MAX_WEIGHT], or an inadmissible Q.
+        A weight below 0 or too large for double precision, or an inadmissible Q.
 
     References
     ----------
@@ -252,8 +252,8 @@ def strategy_cost(
 
     """
     for name, weight in (('r', r), ('p', p)):
-        if not 0.0 <= weight <= MAX_WEIGHT:
-            raise InvalidCost(f'weight {name} = {weight:g} is outside [0, {MAX_WEIGHT:g}]')
+        if not 0.0 <= weight <= MAX_ROOT:
+            raise InvalidCost(f'weight {name} = {weight:g} is outside [0, {MAX_ROOT:g}]')
     if strategy is Strategy.CUSTOM:
         if custom is None:
             raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')

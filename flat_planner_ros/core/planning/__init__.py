@@ -40,18 +40,28 @@ from flat_planner_ros.core.planning.tradeoff import (
     tradeoff_points,
     TradeoffPoint,
 )
+from flat_planner_ros.core.planning.weights import (
+    DEFAULT_EFFORT_WEIGHT,
+    DEFAULT_ENERGY_WEIGHT,
+    MAX_RELATIVE_WEIGHT,
+    MAX_WEIGHT,
+)
 
 __all__ = [
     'CONDITIONS',
     'Strategy',
     'baselines',
     'check_options',
+    'DEFAULT_EFFORT_WEIGHT',
+    'DEFAULT_ENERGY_WEIGHT',
     'duration_advice',
     'Extrema',
     'extrema_of',
     'fastest_points',
     'JointLimits',
     'LimitUse',
+    'MAX_RELATIVE_WEIGHT',
+    'MAX_WEIGHT',
     'MotionRequest',
     'NoFeasibleDuration',
     'OnViolation',

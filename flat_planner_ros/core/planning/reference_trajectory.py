@@ -141,9 +141,8 @@ def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Mot
 
     """
     mapping = flat_map(arm, options.flat_model)
-    cost = strategy_cost(
-        options.strategy, mapping, r=options.r, p=options.p, custom=options.custom
-    )
+    r, p = options.weights(arm)
+    cost = strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
     half = 0.5 * float(duration)
     powers = half**_ORDERS
     with strict_arithmetic():

@@ -26,10 +26,19 @@ from flat_planner_ros.core.arm import (
     FloatArray,
     InvalidRequest,
     locked,
+    PlanarArm,
 )
 from flat_planner_ros.core.insensitive import Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 from flat_planner_ros.core.peak import PeakSettings
+from flat_planner_ros.core.planning.weights import (
+    check_one_form,
+    check_weight,
+    MAX_RELATIVE_WEIGHT,
+    MAX_WEIGHT,
+    paper_weights,
+    PaperWeights,
+)
 import numpy as np
 
 
@@ -143,8 +152,11 @@ class PlanningOptions:
     ----------
     strategy
         Which cost, or which law of its own.
+    effort_weight, energy_weight
+        Weights of effort and potential energy, relative to the arm's own oscillation [-]; None
+        for those of the paper on its arm.
     r, p
-        Weights of effort and potential energy, as in `strategy_cost`.
+        The same as the paper has them, which take their place, as in `strategy_cost`.
     custom
         Q of the strategy `custom`, shape (6, 6).
     flat_model
@@ -161,8 +173,10 @@ class PlanningOptions:
     """
 
     strategy: Strategy = Strategy.MIN_CONTROL_EFFORT
-    r: float = 150.0
-    p: float = 17.0
+    effort_weight: float | None = None
+    energy_weight: float | None = None
+    r: float | None = None
+    p: float | None = None
     custom: FloatArray | None = None
     flat_model: FlatModel = FlatModel.EXACT
     compensate_friction: bool = False
@@ -171,10 +185,23 @@ class PlanningOptions:
     drive: Drive = Drive.EFFORT
 
     def __post_init__(self) -> None:
-        """Lock a copy of the matrix."""
+        """Refuse weights out of range or in two forms, and lock a copy of the matrix."""
+        for name, relative, paper_name, own in (
+            ('effort', self.effort_weight, 'r', self.r),
+            ('energy', self.energy_weight, 'p', self.p),
+        ):
+            check_weight(name, relative, MAX_RELATIVE_WEIGHT)
+            check_weight(paper_name, own, MAX_WEIGHT)
+            check_one_form(name, relative, paper_name, own)
         if self.custom is not None:
             custom = np.array(self.custom, dtype=float)
             object.__setattr__(self, 'custom', locked(custom))
+
+    def weights(self, arm: PlanarArm) -> PaperWeights:
+        """Return r and p for a flat arm, whichever form the weights are given in."""
+        return paper_weights(
+            arm, effort=self.effort_weight, energy=self.energy_weight, r=self.r, p=self.p
+        )
 
 
 class Reason(Enum):

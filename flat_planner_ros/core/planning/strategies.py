@@ -332,10 +332,6 @@ def check_options(arm: PlanarArm, options: PlanningOptions) -> None:
     own = OWN_LAWS.get(options.strategy)
     if own is not None:
         own.check(arm, options)
-    strategy_cost(
-        options.strategy,
-        flat_map(arm, options.flat_model),
-        r=options.r,
-        p=options.p,
-        custom=options.custom,
-    )
+    mapping = flat_map(arm, options.flat_model)
+    r, p = options.weights(arm)
+    strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)

@@ -19,8 +19,16 @@ from enum import Enum
 from math import isqrt
 
 from flat_planner_ros.core.arm import Drive, FlatModel, JointStateRules
-from flat_planner_ros.core.motion_law import MAX_WEIGHT, QuadraticCost, Strategy
-from flat_planner_ros.core.planning import check_options, OnViolation, PlanningOptions
+from flat_planner_ros.core.motion_law import QuadraticCost, Strategy
+from flat_planner_ros.core.planning import (
+    check_options,
+    DEFAULT_EFFORT_WEIGHT,
+    DEFAULT_ENERGY_WEIGHT,
+    MAX_RELATIVE_WEIGHT,
+    MAX_WEIGHT,
+    OnViolation,
+    PlanningOptions,
+)
 from flat_planner_ros.core.session import (
     ReplanFrom,
     SessionSettings,
@@ -34,6 +42,7 @@ from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint
 from flat_planner_ros.ros.parameters.limits import LIMIT_ROWS, limits_of
 from flat_planner_ros.ros.parameters.peak import peak_of, PEAK_ROWS
 from flat_planner_ros.ros.parameters.row import (
+    DOUBLE,
     DOUBLES,
     Row,
     Values,
@@ -92,19 +101,38 @@ ROWS = [
         'what the motion law minimises besides its sixth derivative',
     ),
     Row(
-        'weights.r',
-        PlanningOptions.r,
+        'weights.effort',
+        DOUBLE,
         '',
-        'weight of the control effort, raised to the power of 8',
+        "weight of the control effort, relative to the arm's own oscillation",
+        f'{DEFAULT_EFFORT_WEIGHT:g} where neither it nor weights.r is set',
+        lower=0.0,
+        upper=MAX_RELATIVE_WEIGHT,
+    ),
+    Row(
+        'weights.energy',
+        DOUBLE,
+        '',
+        "weight of the potential energy, relative to the arm's own oscillation",
+        f'{DEFAULT_ENERGY_WEIGHT:g} where neither it nor weights.p is set',
+        lower=0.0,
+        upper=MAX_RELATIVE_WEIGHT,
+    ),
+    Row(
+        'weights.r',
+        DOUBLE,
+        '',
+        "the paper's weight of the control effort, raised to the power of 8",
+        'in place of weights.effort',
         lower=0.0,
         upper=MAX_WEIGHT,
     ),
     Row(
         'weights.p',
-        PlanningOptions.p,
+        DOUBLE,
         '1/s',
-        'weight of the potential energy',
-        'raised to the power of 8',
+        "the paper's weight of the potential energy",
+        'raised to the power of 8; in place of weights.energy',
         lower=0.0,
         upper=MAX_WEIGHT,
     ),
@@ -292,8 +320,10 @@ def build(values: Values) -> PlannerSettings:
     limits = limits_of(values, joints)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
-        r=values['weights.r'],
-        p=values['weights.p'],
+        effort_weight=values.get('weights.effort'),
+        energy_weight=values.get('weights.energy'),
+        r=values.get('weights.r'),
+        p=values.get('weights.p'),
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],

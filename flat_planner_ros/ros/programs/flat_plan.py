@@ -58,7 +58,7 @@ examples:
       the paper's arm, least effort
   flat_plan joint1=90deg --duration 0.8 --params-file my_arm.yaml --plot plan.png
       your own arm, with a figure
-  flat_plan joint1=3.14159 --duration 1 -p strategy:=mixed -p weights.p:=20.0 --csv plan.csv
+  flat_plan joint1=3.14159 --duration 1 -p strategy:=mixed -p weights.energy:=2.0 --csv plan.csv
       another strategy, as points every sampling.period
   flat_plan joint1=1 joint2=0.5 --start joint1=-1 --params-file arm_3dof.yaml --duration 2
       from another start; joints that are not named stay where they are

@@ -180,6 +180,8 @@ def _points(
         duration=options.duration,
     )
     wanted = PlanningOptions(
+        effort_weight=planning.effort_weight,
+        energy_weight=planning.energy_weight,
         r=planning.r,
         p=planning.p,
         flat_model=FlatModel.EXACT,

@@ -14,11 +14,12 @@
 
 """Quadratic costs against the paper's equations, the calculus of variations and bad input."""
 
+import re
+
 from flat_planner_ros.core.arm.errors import InvalidCost
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import (
-    MAX_WEIGHT,
     QuadraticCost,
     Strategy,
     strategy_cost,
@@ -272,15 +273,15 @@ def scaled(matrix, units):
 
 
 @pytest.mark.parametrize('name', ['r', 'p'])
-@pytest.mark.parametrize('value', [-1e-9, MAX_WEIGHT * (1.0 + 1e-12), np.nan, np.inf])
-def test_refuses_a_weight_out_of_range(paper_arm, name, value):
+@pytest.mark.parametrize('value', [-1e-9, 1e30, 1e300, np.nan, np.inf])
+def test_refuses_a_weight_that_is_none(paper_arm, name, value):
     mapping = flat_map(paper_arm, FlatModel.APPROXIMATE)
-    with pytest.raises(InvalidCost, match=rf'weight {name} = {value:g} is outside \[0, 1000\]'):
+    with pytest.raises(InvalidCost, match=re.escape(f'weight {name} = {value:g} is outside')):
         strategy_cost(Strategy.MIXED, mapping, **{name: value})
 
 
-@pytest.mark.parametrize('value', [0.0, MAX_WEIGHT])
-def test_accepts_the_ends_of_the_range(paper_arm, value):
+@pytest.mark.parametrize('value', [0.0, 1000.0, 1e7])
+def test_accepts_weights_of_any_arm(paper_arm, value):
     cost = strategy_cost(
         Strategy.MIXED, flat_map(paper_arm, FlatModel.APPROXIMATE), r=value, p=value
     )

@@ -47,7 +47,7 @@ RATIOS = {
     Strategy.MIN_POTENTIAL_ENERGY: 1.2744,
     Strategy.MIXED: 1.1462,
 }
-"""What strategies with the weights 150 and 17 take with the exact map, relative to that [-]."""
+"""What strategies with their default weights take with the exact map, relative to that [-]."""
 
 RANGE = {'shortest': 0.05, 'longest': 600.0}
 

@@ -336,6 +336,7 @@ def test_replanning_needs_a_goal_and_stopping_a_motion(planner, graph):
         ('flat_model', 'rough', 'approximate'),
         ('start_delay', inf, 'start_delay'),
         ('weights.r', 2000.0, '1000'),
+        ('weights.effort', 31.0, '30'),
         ('weights.Q', [1.0], '36'),
         ('model.stiffness', -1.0, 'stiffness'),
         ('model.inertia_star', [3.3e-5, 6.4e-4], 'kg m^2'),

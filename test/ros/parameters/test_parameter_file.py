@@ -77,6 +77,8 @@ def facts(settings):
         arm.damping,
         arm.gravity,
         options.strategy,
+        options.effort_weight,
+        options.energy_weight,
         options.r,
         options.p,
         options.flat_model,
@@ -114,6 +116,7 @@ WRONG = {
     'text': 'flat_planner:\n  ros__parameters: {strategy: 5.0}\n',
     'choice': 'flat_planner:\n  ros__parameters: {strategy: fastest}\n',
     'range': 'flat_planner:\n  ros__parameters: {weights.r: -1.0}\n',
+    'two forms': 'flat_planner:\n  ros__parameters: {weights: {r: 1.0, effort: 1.0}}\n',
     'misspelt': 'flat_planner:\n  ros__parameters: {weights.rr: 1.0}\n',
     'other form': 'flat_planner:\n  ros__parameters: {model.counterbalance_mass: [1.0, 1.0]}\n',
     'contradiction': 'flat_planner:\n  ros__parameters: {duration: {min: 2.0, max: 1.0}}\n',
@@ -138,7 +141,7 @@ def test_namespaces_decide(tmp_path):
     text = MODEL + '/left/flat_planner:\n  ros__parameters: {weights.r: 5.0}\n'
     text += 'right:\n  flat_planner:\n    ros__parameters: {weights.r: 6.0}\n'
     path = written(tmp_path, text)
-    assert planner_settings(path).session.options.r == 150.0
+    assert planner_settings(path).session.options.r is None
     assert planner_settings(path, node='/left/flat_planner').session.options.r == 5.0
     assert planner_settings(path, node='right/flat_planner').session.options.r == 6.0
 
