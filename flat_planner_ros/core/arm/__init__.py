@@ -41,6 +41,7 @@ from flat_planner_ros.core.arm.errors import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
+from flat_planner_ros.core.arm.imbalance import balanced, imbalance
 from flat_planner_ros.core.arm.joint_merger import JointMerger
 from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
 from flat_planner_ros.core.arm.planar_arm import Drive, NaturalMode, PlanarArm
@@ -64,6 +65,7 @@ from flat_planner_ros.core.arm.urdf import (
 __all__ = [
     'apply_row',
     'ArmDescription',
+    'balanced',
     'bodies_from_links',
     'bodies_from_reduced',
     'check_number',
@@ -81,6 +83,7 @@ __all__ = [
     'FlatModel',
     'FlatPlannerError',
     'FloatArray',
+    'imbalance',
     'InvalidCommand',
     'InvalidCost',
     'InvalidModel',

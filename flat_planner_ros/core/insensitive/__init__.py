@@ -14,6 +14,10 @@
 
 """Insensitivity: the residual on arms other than the model, and laws that keep it small."""
 
+from flat_planner_ros.core.insensitive.imbalance import (
+    imbalance_residual,
+    usual_imbalance_residual,
+)
 from flat_planner_ros.core.insensitive.insensitivity import (
     Criterion,
     DEFAULT_WEIGHT,
@@ -41,6 +45,7 @@ __all__ = [
     'check_insensitivity',
     'Criterion',
     'DEFAULT_WEIGHT',
+    'imbalance_residual',
     'insensitive_motion',
     'insensitive_motion_from',
     'InsensitiveMotion',
@@ -55,4 +60,5 @@ __all__ = [
     'shaped_quintic',
     'Shaper',
     'UncertaintyBox',
+    'usual_imbalance_residual',
 ]

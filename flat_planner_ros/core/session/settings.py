@@ -89,6 +89,8 @@ class SessionSettings:
         Names in kinematic order, the passive one last.
     arm, options
         Nominal model and what is minimised.
+    built
+        The arm as it is built, nearly balanced; None for the nominal one.
     period
         Spacing of a motion's samples [s].
     default_duration
@@ -144,6 +146,7 @@ class SessionSettings:
     joints: tuple[str, ...]
     arm: PlanarArm
     options: PlanningOptions
+    built: PlanarArm | None = None
     period: float = 0.005
     default_duration: float = 0.0
     duration_factor: float = 1.0

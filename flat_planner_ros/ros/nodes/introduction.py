@@ -19,8 +19,10 @@ from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 
-from flat_planner_ros.core.arm import Drive
+from flat_planner_ros.core.arm import Drive, imbalance, InvalidRequest
+from flat_planner_ros.core.insensitive import usual_imbalance_residual
 from flat_planner_ros.core.planning import JointLimits
+from flat_planner_ros.core.session import SessionSettings
 from flat_planner_ros.ros.parameters.limits import LIMITS
 from flat_planner_ros.ros.parameters.parameter_file import block_names, reaches
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
@@ -83,8 +85,22 @@ def planner_sentence(node: Node, settings: PlannerSettings) -> str:
     return (
         f'{arm_sentence(session.joints, session.options.drive)}; strategy '
         f'{session.options.strategy.value}; {_limits(session.joints, session.limits)}; goals on '
-        f'{goal}'
+        f'{goal}{_imbalance(session)}'
     )
+
+
+def _imbalance(session: SessionSettings) -> str:
+    """Return what an arm lacks of balance and what that leaves, a clause; nothing for none."""
+    if session.built is None:
+        return ''
+    share = f"; imbalance {100.0 * imbalance(session.built):.2g} % of the last links' inertia"
+    try:
+        left, duration = usual_imbalance_residual(
+            session.built, session.arm, session.options.drive
+        )
+    except InvalidRequest:
+        return share  # nothing oscillates
+    return f'{share}, which leaves about {left:.2g} rad after 90 degrees in {duration:.3g} s'
 
 
 def _limits(joints: Sequence[str], limits: JointLimits | None) -> str:

@@ -230,6 +230,7 @@ class PlannerNode(GuardedNode):
                 with_advice=self._settings.report_advice,
                 with_baselines=self._settings.report_baselines,
                 doubt=self._doubt(),
+                built=self._settings.session.built,
             )
         except RequestRejected as error:
             status = diagnostics.rejected_status(error, goal)

@@ -19,8 +19,11 @@ from dataclasses import replace
 from typing import Any
 
 from flat_planner_ros.core.arm import (
+    balanced,
+    counterbalances,
     displaced_com,
     Drive,
+    imbalance,
     NotFlat,
     PlanarArm,
     suggest_counterbalances,
@@ -36,6 +39,12 @@ from flat_planner_ros.ros.parameters.row import (
 import numpy as np
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
+AUTO = 'auto'
+"""Masses or arms of the counterbalances that follow from the rest."""
+
+MAX_IMBALANCE = 0.2
+"""Largest imbalance that may be accepted [-]: beyond, it does more than first order says."""
 
 MODEL_ROWS = [
     Row(
@@ -53,8 +62,31 @@ MODEL_ROWS = [
     Row('model.link_com', DOUBLES, 'm', 'centres of mass of the links from their joints'),
     Row('model.link_mass', DOUBLES, 'kg', 'masses of the links'),
     Row('model.link_inertia', DOUBLES, 'kg m^2', 'barycentric moments of inertia of the links'),
-    Row('model.counterbalance_mass', DOUBLES, 'kg', 'counterbalances of the last two links'),
-    Row('model.counterbalance_arm', DOUBLES, 'm', 'their distances behind the joints'),
+    Row(
+        'model.counterbalance_mass',
+        DOUBLES,
+        'kg',
+        'counterbalances of the last two links',
+        'auto = what balances them with the arms',
+        word=AUTO,
+    ),
+    Row(
+        'model.counterbalance_arm',
+        DOUBLES,
+        'm',
+        'their distances behind the joints',
+        'auto = what balances them with the masses',
+        word=AUTO,
+    ),
+    Row(
+        'model.max_imbalance',
+        0.02,
+        '',
+        'imbalance of the last two links that is accepted, relative to their own inertias',
+        'what it leaves is said at the start and in every verdict; 0 = none',
+        lower=0.0,
+        upper=MAX_IMBALANCE,
+    ),
     Row('friction.viscous', DOUBLES, 'N m s/rad', 'viscous friction of the actuated joints'),
     Row('friction.coulomb', DOUBLES, 'N m', 'Coulomb friction of the actuated joints'),
     Row('model.stiffness', DOUBLE, 'N m/rad', 'stiffness of the passive joint'),
@@ -77,6 +109,9 @@ LINK_ARRAYS = (
 )
 """The arrays of the full form of the model."""
 
+LINK_SHAPE = ('link_length', 'link_com', 'link_mass')
+"""Those that tell which counterbalances are needed."""
+
 EXAMPLE_ARM: Values = {
     'joints': ['joint1', 'joint2'],
     'model.inertia_star': [6.4e-4, 3.3e-5],
@@ -86,25 +121,59 @@ EXAMPLE_ARM: Values = {
 """The paper's arm, for nodes that are started without any model (config/arm_2dof.yaml)."""
 
 
-def arm_of(
-    values: Values, imbalance: Sequence[float] = (0.0, 0.0)
-) -> tuple[tuple[str, ...], PlanarArm]:
+def arm_of(values: Values) -> tuple[tuple[str, ...], PlanarArm]:
     """
-    Return the joint names and the arm.
+    Return the joint names and the flat arm that is planned for.
 
     Parameters
     ----------
     values
         The nominal model.
-    imbalance
-        Static moments that the last two links of the true arm have too much [kg m].
 
     Raises
     ------
     InvalidParameter
         The model is incomplete, or given in both forms.
     FlatPlannerError
-        The numbers are not those of a flat arm.
+        The numbers are not those of an arm that is flat, or nearly so.
+
+    """
+    joints, built = built_arm(values)
+    return joints, built if _is_flat(built) else balanced(built)
+
+
+def imbalanced_arm(values: Values) -> PlanarArm | None:
+    """Return the arm as it is built, None if that is the flat one; errors as of `arm_of`."""
+    _, built = built_arm(values)
+    return None if _is_flat(built) else built
+
+
+def _is_flat(arm: PlanarArm) -> bool:
+    """Tell whether an arm is as good as balanced."""
+    try:
+        arm.check_flat()
+    except NotFlat:
+        return False
+    return True
+
+
+def built_arm(
+    values: Values, excess: Sequence[float] = (0.0, 0.0)
+) -> tuple[tuple[str, ...], PlanarArm]:
+    """
+    Return the joint names and the arm with what it lacks of balance.
+
+    Parameters
+    ----------
+    values
+        The nominal model.
+    excess
+        Static moments that the last two links have too much besides [kg m].
+
+    Raises
+    ------
+    FlatPlannerError
+        As for `arm_of`; or an excess without links that could have it.
 
     """
     joints = tuple(values.get('joints', ()))
@@ -113,7 +182,7 @@ def arm_of(
             'joints must name the joints in kinematic order, e.g. joints: [joint1, joint2]'
         )
     common = _common(values, len(joints))
-    links = {name: values[f'model.{name}'] for name in LINK_ARRAYS if f'model.{name}' in values}
+    links = links_of(values)
     is_reduced = 'model.inertia_star' in values
     if is_reduced:
         arm = _reduced_arm(values, links, common)
@@ -123,16 +192,42 @@ def arm_of(
         arm = PlanarArm.from_links(**links, **common)
     if arm.n != len(joints):
         raise InvalidParameter(f'{len(joints)} joints are named, but the model has {arm.n}')
-    _check_flat(arm, links)
-    if any(imbalance):
+    _check_balance(arm, links, values.get('model.max_imbalance', 0.0))
+    if any(excess):
         if is_reduced:
             raise InvalidParameter(
                 'an imbalance needs the model in its full form: the reduced one does not know '
                 'the masses of the last two links'
             )
-        com = displaced_com(links['link_com'], links['link_mass'], imbalance)
+        com = displaced_com(links['link_com'], links['link_mass'], excess)
         arm = PlanarArm.from_links(**{**links, 'link_com': com}, **common)
     return joints, arm
+
+
+def links_of(values: Values) -> dict[str, Any]:
+    """
+    Return the arrays of the links that are given, the counterbalances as numbers.
+
+    Raises
+    ------
+    FlatPlannerError
+        The counterbalances are to follow, and none or nothing tells them.
+
+    """
+    links = {name: values[f'model.{name}'] for name in LINK_ARRAYS if f'model.{name}' in values}
+    masses, arms = (links.get(f'counterbalance_{kind}') for kind in ('mass', 'arm'))
+    if AUTO not in (masses, arms):
+        return links
+    if masses == arms:
+        raise InvalidParameter(
+            'model.counterbalance_mass and model.counterbalance_arm are both auto: give one'
+        )
+    given, wanted = ('arm', 'mass') if masses == AUTO else ('mass', 'arm')
+    shape = {name: _required(values, f'model.{name}') for name in LINK_SHAPE}
+    value = _required(values, f'model.counterbalance_{given}')
+    found = counterbalances(**shape, **{given: value})
+    links[f'counterbalance_{wanted}'] = getattr(found, wanted).tolist()
+    return links
 
 
 def _common(values: Values, joints: int) -> dict[str, Any]:
@@ -160,15 +255,22 @@ def _reduced_arm(values: Values, links: Mapping[str, Any], common: Mapping[str, 
     return PlanarArm.reduced(inertia_star=inertia, tip_mass=tip_mass, **links, **common)
 
 
-def _check_flat(arm: PlanarArm, links: Mapping[str, Any]) -> None:
-    """Refuse an arm whose last two links are not balanced; say what would balance them."""
+def _check_balance(arm: PlanarArm, links: Mapping[str, Any], accepted: float) -> None:
+    """Refuse an arm whose last two links lack more balance; say what would balance them."""
+    if imbalance(arm) <= accepted:
+        return
     try:
         arm.check_flat()
     except NotFlat as error:
         mended = suggest_counterbalances(
             **{name: links[name] for name in LINK_ARRAYS if name != 'link_inertia'}
         )
-        raise NotFlat(error.link, error.static_moment, f'{error}; {mended}') from error
+        raise NotFlat(
+            error.link,
+            error.static_moment,
+            f"{error}; imbalance {imbalance(arm):.3g} of the links' inertias, accepted up to "
+            f'model.max_imbalance = {accepted:g}; {mended}; or counterbalance_arm: auto',
+        ) from error
 
 
 def per_joint(

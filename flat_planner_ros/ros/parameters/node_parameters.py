@@ -129,6 +129,8 @@ class NodeParameters(Generic[Settings]):
 
 def _declare(node: Node, row: Row, default: Any) -> None:
     """Declare one parameter and put the middleware's complaint about its type into words."""
+    if row.word and isinstance(default, Parameter.Type):
+        default = None  # without a type: it may be the word
     try:
         node.declare_parameter(row.name, default, row.descriptor())
     except InvalidParameterValueException as error:

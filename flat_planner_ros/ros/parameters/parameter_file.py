@@ -92,7 +92,8 @@ def read_settings(
         value = given.get(row.name, defaults.get(row.name, row.default))
         if isinstance(value, Parameter.Type):
             continue
-        _check_type(row, value)
+        if not row.word:
+            _check_type(row, value)
         row.check(value)
         values[row.name] = value
     settings = build(values)

@@ -36,7 +36,7 @@ from flat_planner_ros.core.session import (
     StartSource,
     WhenMoving,
 )
-from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
+from flat_planner_ros.ros.parameters.arm_model import arm_of, imbalanced_arm, MODEL_ROWS
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
 from flat_planner_ros.ros.parameters.limits import LIMIT_ROWS, limits_of
@@ -336,6 +336,7 @@ def build(values: Values) -> PlannerSettings:
     session = SessionSettings(
         joints=joints,
         arm=arm,
+        built=imbalanced_arm(values),
         options=options,
         period=values['sampling.period'],
         default_duration=values['duration.default'],

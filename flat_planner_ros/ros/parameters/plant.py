@@ -19,7 +19,7 @@ from enum import Enum
 
 from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.core.plant import DriveSettings, Sensing, SimulationSettings
-from flat_planner_ros.ros.parameters.arm_model import arm_of, FIXED_MODEL_ROWS, per_joint
+from flat_planner_ros.ros.parameters.arm_model import built_arm, FIXED_MODEL_ROWS, per_joint
 from flat_planner_ros.ros.parameters.row import DOUBLES, InvalidParameter, Row, Values
 
 
@@ -233,7 +233,7 @@ def build(values: Values) -> PlantSettings:
         raise InvalidParameter(
             f'mismatch.imbalance needs two numbers, for links n-1 and n, got {len(imbalance)}'
         )
-    joints, arm = arm_of(values, imbalance)
+    joints, arm = built_arm(values, imbalance)
     n = len(joints)
     publish_clock, factor = values['publish_clock'], values['real_time_factor']
     if factor != 1.0 and not publish_clock:

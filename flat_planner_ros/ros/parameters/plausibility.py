@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from math import pi
 
 from flat_planner_ros.core.arm import Drive, PlanarArm
-from flat_planner_ros.ros.parameters.arm_model import arm_of
+from flat_planner_ros.ros.parameters.arm_model import arm_of, links_of
 from flat_planner_ros.ros.parameters.row import Values
 
 FREQUENCIES = (0.1, 50.0)
@@ -50,8 +50,9 @@ def doubts(values: Values) -> Iterator[str]:
         A valid nominal model.
 
     """
+    links = links_of(values)
     for name, (largest, unit, other, factor) in LARGEST.items():
-        numbers = values.get(f'model.{name}', ())
+        numbers = links.get(name, ())
         worst = max(map(abs, numbers), default=0.0)
         if worst > largest:
             yield (

@@ -86,6 +86,8 @@ class Row:
         Whether infinity is allowed, meaning no limit.
     read_only
         Whether it is structural, fixed at the start; all others may change at run time.
+    word
+        Text that it may be in place of its value; empty for none.
 
     """
 
@@ -99,6 +101,7 @@ class Row:
     upper: float = inf
     may_be_infinite: bool = False
     read_only: bool = False
+    word: str = ''
 
     @property
     def default(self) -> Any:
@@ -141,6 +144,8 @@ class Row:
         allowed = self.constraints or ANY_VALUE[self.type]
         if self.may_be_infinite and not self.constraints:
             allowed = 'numbers, or .inf'
+        if self.word:
+            allowed += f', or {self.word}'
         if isinstance(self.given, Parameter.Type):
             allowed += '; may be left out'
         return f'{allowed}; fixed at the start' if self.read_only else allowed
@@ -160,6 +165,7 @@ class Row:
             additional_constraints=self._allowed,
             floating_point_range=ranges,
             read_only=self.read_only,
+            dynamic_typing=bool(self.word),
         )
 
     def check(self, value: Any) -> None:
@@ -172,6 +178,8 @@ class Row:
             The message gives the name, the value and the constraint.
 
         """
+        if self.word and not self._has_type(value):
+            raise wrong_type(self, value)
         if self.choices and value not in self.choices:
             raise InvalidParameter(f'{self.name} must be {self.constraints}, got {value!r}')
         numbers = value if isinstance(value, Sequence) and not isinstance(value, str) else [value]
@@ -184,10 +192,20 @@ class Row:
                     f'{self.name} must be {self.constraints or "finite"}, got {number}'
                 )
 
+    def _has_type(self, value: Any) -> bool:
+        """Tell whether a value is of the type, or the word in its place: ROS checks neither."""
+        if value == self.word:
+            return True
+        try:
+            return Parameter.Type.from_parameter_value(value) is self.type
+        except TypeError:
+            return False
+
 
 def wrong_type(row: Row, value: Any) -> InvalidParameter:
     """Return the complaint about a value of another type than the parameter's."""
+    word = f' or {row.word}' if row.word else ''
     return InvalidParameter(
         f'{row.name} must be of type {row.type.name.lower().replace("_", " ")}'
-        f'{TYPE_HINTS.get(row.type, "")}, got {value!r}'
+        f'{TYPE_HINTS.get(row.type, "")}{word}, got {value!r}'
     )

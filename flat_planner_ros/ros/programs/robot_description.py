@@ -27,7 +27,7 @@ from flat_planner_ros.core.arm import (
     urdf_of,
     UrdfLimits,
 )
-from flat_planner_ros.ros.parameters.arm_model import arm_of, LINK_ARRAYS
+from flat_planner_ros.ros.parameters.arm_model import arm_of, links_of
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.parameters.row import Values
@@ -114,7 +114,7 @@ def description_of(values: Values, *, drawn_length: float | None = None) -> ArmD
 
 def _bodies_of(values: Values, drawn_length: float | None) -> tuple[LinkBody, ...]:
     """Return the links of either form of the model."""
-    links = {name: values[f'model.{name}'] for name in LINK_ARRAYS if f'model.{name}' in values}
+    links = links_of(values)
     if 'model.inertia_star' not in values:
         return bodies_from_links(**links)
     return bodies_from_reduced(

@@ -18,8 +18,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flat_planner_ros.core.arm import InvalidRequest
-from flat_planner_ros.core.insensitive import PredictedResidual
+from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.monitor import (
     LastLinks,
     Level,
@@ -27,13 +26,7 @@ from flat_planner_ros.core.monitor import (
     StiffnessEstimate,
     VibrationReport,
 )
-from flat_planner_ros.core.planning import (
-    baselines,
-    duration_advice,
-    RequestRejected,
-    residual_of_plan,
-    time_advice,
-)
+from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, Shortfall
 from flat_planner_ros.core.tracking import Certificate
 from flat_planner_ros.ros.wire.interfaces import (
@@ -42,6 +35,7 @@ from flat_planner_ros.ros.wire.interfaces import (
     STATUS_NAME,
     TRACKER_NAME,
 )
+from flat_planner_ros.ros.wire.prediction_values import left_by_imbalance, residual_values
 from flat_planner_ros.ros.wire.stamps import time_msg
 from flat_planner_ros.ros.wire.verdict_text import clauses, list_text, precise, text_of
 
@@ -105,6 +99,7 @@ def accepted_status(
     with_advice: bool = True,
     with_baselines: bool = False,
     doubt: str = '',
+    built: PlanarArm | None = None,
 ) -> DiagnosticStatus:
     """
     Return the verdict on a goal that became a motion.
@@ -121,6 +116,8 @@ def accepted_status(
         Whether to say when more time pays, and what simpler methods would leave behind.
     doubt
         Why it may not be carried out, a clause; empty for no reason.
+    built
+        The arm with what it lacks of balance; None for a balanced one.
 
     """
     plan = motion.plan
@@ -131,6 +128,7 @@ def accepted_status(
         f'peak effort {peaks[strongest]:.4g} N m of {joints[strongest]}, '
         f'starts at {motion.start:.3f} s, in {motion.start - motion.planned_at:.3f} s'
     )
+    imbalance = left_by_imbalance(motion, built)
     values: dict[str, float | int | str | None] = {
         **_motion_values(motion, 'ACCEPTED'),
         'duration_min': plan.duration if motion.is_shortest else None,
@@ -140,12 +138,15 @@ def accepted_status(
         'optimality_residual': plan.optimality_residual,
         'cost': plan.cost_value,
         'duration_bound': plan.least_duration,
-        **_residual_values(motion, with_advice=with_advice, with_baselines=with_baselines),
+        'imbalance_residual': imbalance,
+        **residual_values(motion, with_advice=with_advice, with_baselines=with_baselines),
     }
     for quantity in ('peak_effort', 'rms_effort', 'peak_velocity'):
         values.update(_joint_values(quantity, joints, getattr(plan, quantity).tolist()))
     if motion.swing is not None:
         message += f', from a swing of {motion.swing:.3g} rad'
+    if imbalance is not None:
+        message += f'; imbalance leaves about {imbalance:.2g} rad'
     level = DiagnosticStatus.OK
     if doubt:
         level = DiagnosticStatus.WARN
@@ -335,35 +336,6 @@ def _whole_values(model: ModelEstimate | None) -> Values:
     if model is None or model.reason or model.values is None or model.stds is None:
         return {}
     return model_values(model.values, model.stds)
-
-
-def _residual_values(motion: Motion, *, with_advice: bool, with_baselines: bool) -> Values:
-    """Return what a motion is predicted to leave behind, and what others would."""
-    try:
-        residual = residual_of_plan(motion.plan, motion.samples)
-    except InvalidRequest:
-        return {}  # an arm that does not oscillate leaves nothing to predict
-    values: dict[str, float | int | str | None] = {
-        'predicted_residual': residual.nominal,
-        'predicted_residual_worst': residual.worst,
-        'predicted_residual_box': str(residual.box),
-        'predicted_miss_worst': residual.miss or None,
-        'advice': _advice(motion, residual) if with_advice else None,
-    }
-    if with_baselines:
-        for point in baselines(motion.plan):
-            values[f'baseline.{point.series}.rms_effort'] = point.rms_effort
-            values[f'baseline.{point.series}.residual'] = point.nominal
-            values[f'baseline.{point.series}.residual_worst'] = point.worst
-    return values
-
-
-def _advice(motion: Motion, residual: PredictedResidual) -> str | None:
-    """Return in one line what would pay, None if nothing would."""
-    lines = [duration_advice(motion.plan, residual)]
-    if motion.is_shortest:
-        lines.append(time_advice(motion.plan))
-    return '; '.join(line for line in lines if line) or None
 
 
 def _joint_values(quantity: str, joints: Sequence[str], values: Sequence[float | None]) -> Values:

@@ -39,6 +39,7 @@ UNITS = {
     'predicted_residual': 'rad',
     'predicted_residual_worst': 'rad',
     'predicted_miss_worst': 'rad',
+    'imbalance_residual': 'rad',
     'residual': 'rad',
     'residual_worst': 'rad',
     'time': 's',
