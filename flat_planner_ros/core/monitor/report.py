@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.monitor.clipping import clipped_remark
 from flat_planner_ros.core.monitor.course import compare, Course, judge_arrival
 from flat_planner_ros.core.monitor.doubtful_samples import doubt_of_times, seen_oscillation
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
@@ -172,6 +173,7 @@ def assess(
         for joint in range(len(motion.joint_names))
     )
     late = float(times[0]) - done.end if times.size else 0.0
+    clipped = clipped_remark(done, *measured.efforts.between(done.start, done.end))
     # Nothing seen is said once, not once for every number that is missing.
     remarks: tuple[str, ...] = (cause or fit.reason,)
     if times.size:
@@ -187,9 +189,10 @@ def assess(
             model.text if model else '',
         )
     severity = Level.worst(
-        (arrival.level, _level(fit, settings), Level.WARN if foreign else Level.OK)
+        (arrival.level, _level(fit, settings), Level.WARN if foreign or clipped else Level.OK)
     )
-    sentence = (clock.remark(course), arrival.remark, foreign, _verdict(fit, settings), *remarks)
+    said = (clock.remark(course), arrival.remark, clipped, foreign)
+    sentence = (*said, _verdict(fit, settings), *remarks)
     return VibrationReport(
         level=Level.STALE if stale else severity,
         message='; '.join(filter(None, sentence)),

@@ -49,9 +49,9 @@ PAPER = FlatModel.APPROXIMATE
 
 STRATEGIES = {
     'polynomial': PlanningOptions(strategy=Strategy.POLYNOMIAL, flat_model=PAPER),
-    'effort': PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, flat_model=PAPER),
-    'energy': PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY, flat_model=PAPER),
-    'mixed': PlanningOptions(strategy=Strategy.MIXED, flat_model=PAPER),
+    'effort': PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, r=150.0, flat_model=PAPER),
+    'energy': PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY, p=17.0, flat_model=PAPER),
+    'mixed': PlanningOptions(strategy=Strategy.MIXED, r=150.0, p=17.0, flat_model=PAPER),
     'custom': PlanningOptions(
         strategy=Strategy.CUSTOM,
         custom=np.diag([1e4, 0.0, 3e8, 0.0, 0.0, 1.0]),
