@@ -15,6 +15,7 @@
 """Adoption of estimates: what the monitor finds into a planner's parameters."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import FlatPlannerError
@@ -22,6 +23,8 @@ from flat_planner_ros.core.monitor import AdoptionRefused, ModelTuner
 from flat_planner_ros.ros.nodes.node_log import NodeLog
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
+from flat_planner_ros.ros.parameters.row import Values
+from flat_planner_ros.ros.parameters.saved_model import model_file, NotSaved, save
 from flat_planner_ros.ros.wire import estimates, interfaces
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -29,7 +32,7 @@ from std_srvs.srv import Trigger
 
 class ModelAdoption:
     """
-    Hears the monitor's reports and adopts an estimate when asked to, or by itself.
+    Hears the monitor's reports, adopts an estimate when asked to or by itself, saves the model.
 
     Parameters
     ----------
@@ -41,6 +44,8 @@ class ModelAdoption:
         Returns the absolute start of what was sent last [s], None before the first motion.
     announce
         Publishes a status.
+    values
+        Returns the present values of all parameters.
 
     """
 
@@ -51,16 +56,20 @@ class ModelAdoption:
         settings: Callable[[], PlannerSettings],
         last_start: Callable[[], float | None],
         announce: Callable[[DiagnosticStatus], None],
+        values: Callable[[], Values],
     ) -> None:
         self._node = node
         self._log = log
         self._settings = settings
         self._last_start = last_start
         self._announce = announce
+        self._values = values
         self._tuner = ModelTuner()
+        self._adopted: list[str] = []
         report = interfaces.topic_of(interfaces.MONITOR, interfaces.REPORT)
         node.create_subscription(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
         node.create_service(Trigger, interfaces.ADOPT, self._on_adopt)
+        node.create_service(Trigger, interfaces.SAVE, self._on_save)
 
     def _on_report(self, msg: DiagnosticArray) -> None:
         """Keep an estimate, and adopt it at once if it follows the own last motion and may be."""
@@ -100,4 +109,23 @@ class ModelAdoption:
         self._tuner.mark_adopted(adoption)
         status = estimates.adopted_status(adoption)
         self._announce(status)
+        self._adopted.append(status.message)
         return status
+
+    def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Write the present model to a file that the nodes read."""
+        remarks = [
+            'The model of an arm, as a planner had it; give it to the nodes after their own file:',
+            '--params-file YOURS --params-file THIS',
+            *(self._adopted or ['nothing has been adopted since the planner started']),
+        ]
+        text = model_file(self._values(), self._node.get_namespace(), remarks)
+        try:
+            response.message = save(Path(self._settings().save_path), text)
+            response.success = True
+        except NotSaved as error:
+            response.message = str(error)
+            response.success = False
+        say = self._log.info if response.success else self._log.error
+        say(response.message)
+        return response

@@ -66,7 +66,12 @@ class PlannerNode(GuardedNode):
         )
         self._efforts = EffortStream(self, efforts, self._session)
         self._adoption = ModelAdoption(
-            self, self._log, lambda: self._settings, lambda: self._sent_start, self._publish_status
+            self,
+            self._log,
+            lambda: self._settings,
+            lambda: self._sent_start,
+            self._publish_status,
+            lambda: self._configuration.values,
         )
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
         for service, act, nothing in (

@@ -86,13 +86,18 @@ class NodeParameters(Generic[Settings]):
         for row in rows:
             _declare(node, row, defaults.get(row.name, row.default))
         self.settings = self._checked({})
-        for doubt in doubts(self._values({})):
+        for doubt in doubts(self.values):
             node.get_logger().warning(doubt)
         self.is_example = bool(defaults)
         if defaults:
             node.get_logger().info("no model is given: this is the paper's arm")
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._changed)
+
+    @property
+    def values(self) -> Values:
+        """Return the present values of all parameters that have one."""
+        return self._values({})
 
     def _checked(self, changes: Values) -> Settings:
         """Return the settings of the present values with some changes."""

@@ -78,6 +78,8 @@ class PlannerSettings:
         Additions to the verdict on a goal.
     stream_effort
         Whether `~/effort_commands` is published.
+    save_path
+        File that `~/save_model` writes.
 
     """
 
@@ -90,6 +92,7 @@ class PlannerSettings:
     report_advice: bool
     report_baselines: bool
     stream_effort: bool
+    save_path: str
 
 
 ROWS = [
@@ -302,6 +305,14 @@ ROWS = [
         '',
         'publish ~/effort_commands every sampling.period while the arm moves',
     ),
+    Row(
+        'save_model.path',
+        'arm_model.yaml',
+        '',
+        'file that ~/save_model writes',
+        'one that is there is kept under another name',
+        read_only=True,
+    ),
 ]
 """All parameters of the planner node."""
 
@@ -373,6 +384,7 @@ def build(values: Values) -> PlannerSettings:
         report_advice=values['report_advice'],
         report_baselines=values['report_baselines'],
         stream_effort=values['stream_effort'],
+        save_path=values['save_model.path'],
     )
 
 

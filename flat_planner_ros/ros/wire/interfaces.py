@@ -45,6 +45,7 @@ REPLAN = '~/replan'
 STOP = '~/stop'
 SETTLE = '~/settle'
 ADOPT = '~/adopt_estimate'
+SAVE = '~/save_model'
 
 RESET = '~/reset'
 RELEASE = '~/release'

@@ -17,6 +17,9 @@
 from math import pi
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
+from flat_planner_ros.ros.parameters import planner, plant
+from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.wire import interfaces
 import pytest
 from rcl_interfaces.msg import SetParametersResult
@@ -202,6 +205,32 @@ def test_a_motor_that_holds_is_recognised(graph):
     report = suite.report(1.0)
     assert report['estimate_basis'] == 'held'
     assert float(report['stiffness_estimate']) == pytest.approx(1.1 * STIFFNESS, rel=5e-3)
+
+
+def test_what_was_adopted_is_kept_in_a_file_that_the_nodes_read(graph, tmp_path):
+    path = tmp_path / 'arm_model.yaml'
+    bench = Told(graph, {'save_model.path': str(path)})
+    saved = graph.call(Trigger, '/flat_planner/save_model')
+    assert (saved.success, saved.message) == (True, f'the model is saved in {path}')
+    assert 'nothing has been adopted' in path.read_text('utf-8')
+    bench.report(report_msg())
+    assert bench.adopt()[0]
+    saved = graph.call(Trigger, '/flat_planner/save_model')
+    assert saved.message == f'the model is saved in {path}; what was there is now {path}.1'
+    assert 'stiffness 0.003 -> 0.0033' in path.read_text('utf-8')
+    for module, node in ((planner, 'flat_planner'), (plant, 'flat_plant')):
+        settings = read_settings(path, module.ROWS, module.build, node=node)
+        arm = settings.session.arm if module is planner else settings.simulation.arm
+        assert [arm.stiffness, arm.damping] == pytest.approx(bench.model())
+    again = graph.create(MonitorNode, None, '--params-file', str(path))
+    assert again.get_parameter('model.stiffness').value == pytest.approx(1.1 * STIFFNESS)
+
+
+def test_a_file_that_cannot_be_written_is_said(graph, tmp_path):
+    Told(graph, {'save_model.path': str(tmp_path / 'none' / 'arm.yaml')})
+    saved = graph.call(Trigger, '/flat_planner/save_model')
+    assert not saved.success
+    assert saved.message == f'cannot write {tmp_path}/none/arm.yaml: No such file or directory'
 
 
 @pytest.mark.parametrize('basis', ['free', 'held'])
