@@ -40,7 +40,7 @@ from flat_planner_ros.core.planning.tradeoff import (
     tradeoff_points,
     TradeoffPoint,
 )
-from flat_planner_ros.core.planning.weights import (
+from flat_planner_ros.core.planning.cost_weights import (
     DEFAULT_EFFORT_WEIGHT,
     DEFAULT_ENERGY_WEIGHT,
     MAX_RELATIVE_WEIGHT,

@@ -31,7 +31,7 @@ from flat_planner_ros.core.arm import (
 from flat_planner_ros.core.insensitive import Insensitivity
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 from flat_planner_ros.core.peak import PeakSettings
-from flat_planner_ros.core.planning.weights import (
+from flat_planner_ros.core.planning.cost_weights import (
     check_one_form,
     check_weight,
     MAX_RELATIVE_WEIGHT,

@@ -16,7 +16,7 @@
 
 from flat_planner_ros.core.arm import InvalidCost, PlanarArm
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, Strategy
-from flat_planner_ros.core.planning.weights import MAX_RELATIVE_WEIGHT, MAX_WEIGHT
+from flat_planner_ros.core.planning.cost_weights import MAX_RELATIVE_WEIGHT, MAX_WEIGHT
 import numpy as np
 import pytest
 
