@@ -36,6 +36,9 @@ ROLL_INERTIA = 0.05
 NO_LIMIT = 1e9
 """What stands for an unknown effort or velocity limit where URDF wants a number [N m], [rad/s]."""
 
+COMMANDED = {'effort', 'position'}
+"""Command interfaces for which the planner's command has something."""
+
 COLOURS = {
     'base': '0.25 0.25 0.28 1',
     'actuated': '0.20 0.45 0.75 1',
@@ -85,8 +88,8 @@ class ControlBlock:
     ----------
     plugin
         Hardware plugin, or a key of `PLUGINS`.
-    command_interface
-        ``effort`` or ``position``, of the actuated joints; the passive one has none.
+    command_interfaces
+        ``effort``, ``position`` or both, of the actuated joints; the passive one has none.
     initial_position
         Joint angles at the start of a simulated hardware, shape (n,) [rad]; zeros by default.
     hardware_parameters
@@ -97,16 +100,18 @@ class ControlBlock:
     """
 
     plugin: str
-    command_interface: str = 'effort'
+    command_interfaces: Sequence[str] = ('effort',)
     initial_position: Sequence[float] = ()
     hardware_parameters: Mapping[str, str] = field(default_factory=dict)
     controllers: str = ''
 
     def __post_init__(self) -> None:
         """Refuse an interface that the planner's command has nothing for."""
-        if self.command_interface not in ('effort', 'position'):
+        wanted = set(self.command_interfaces)
+        if not wanted or not wanted <= COMMANDED or len(wanted) != len(self.command_interfaces):
             raise FlatPlannerError(
-                f'command_interface must be effort or position, got {self.command_interface!r}'
+                f'command_interfaces must be effort, position or both, got '
+                f'{", ".join(self.command_interfaces) or "none"}'
             )
 
 
@@ -191,7 +196,7 @@ def urdf_of(description: ArmDescription, control: ControlBlock | None = None) ->
             SubElement(shape, 'material', name='base')
     parent, x, roll = BASE, 0.0, _roll(arm.gravity)
     for i, (joint, link) in enumerate(zip(joints, links, strict=True)):
-        _add_joint(robot, description, i, parent, (x, roll))
+        _add_joint(robot, description, i, parent, (x, roll), has_control=control is not None)
         _add_link(robot, link, description.bodies[i], i == arm.n - 1, size)
         parent, x, roll = link, description.bodies[i].length, 0.0
         if joint == joints[-1]:
@@ -224,8 +229,10 @@ def _add_joint(
     index: int,
     parent: str,
     origin: tuple[float, float],
+    *,
+    has_control: bool,
 ) -> None:
-    """Add a joint at x [m], turned by a roll [rad]."""
+    """Add a joint at x [m], turned by a roll [rad]; controllers want limits of every joint."""
     arm = description.arm
     limits = description.limits[index] if description.limits else UrdfLimits()
     is_bounded = isfinite(limits.lower) and isfinite(limits.upper)
@@ -239,7 +246,7 @@ def _add_joint(
     damping = arm.damping if is_passive else arm.viscous_friction[index]
     friction = 0.0 if is_passive else arm.coulomb_friction[index]
     SubElement(joint, 'dynamics', damping=_number(damping), friction=_number(friction))
-    if is_bounded or isfinite(limits.velocity) or isfinite(limits.effort):
+    if has_control or is_bounded or isfinite(limits.velocity) or isfinite(limits.effort):
         numbers = {'lower': limits.lower, 'upper': limits.upper} if is_bounded else {}
         numbers['effort'] = min(limits.effort, NO_LIMIT)
         numbers['velocity'] = min(limits.velocity, NO_LIMIT)
@@ -286,7 +293,8 @@ def _add_control(robot: Element, description: ArmDescription, control: ControlBl
     for name, angle in zip(description.joints, start, strict=True):
         joint = SubElement(block, 'joint', name=name)
         if name != description.joints[-1]:
-            SubElement(joint, 'command_interface', name=control.command_interface)
+            for interface in control.command_interfaces:
+                SubElement(joint, 'command_interface', name=interface)
         for interface in ('position', 'velocity', 'effort'):
             state = SubElement(joint, 'state_interface', name=interface)
             if interface == 'position':

@@ -16,6 +16,12 @@
 
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
+from flat_planner_ros.core.planning.cost_weights import (
+    DEFAULT_EFFORT_WEIGHT,
+    DEFAULT_ENERGY_WEIGHT,
+    MAX_RELATIVE_WEIGHT,
+    MAX_WEIGHT,
+)
 from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.free_conditions import stop_plan, with_via_times
@@ -39,12 +45,6 @@ from flat_planner_ros.core.planning.tradeoff import (
     time_advice,
     tradeoff_points,
     TradeoffPoint,
-)
-from flat_planner_ros.core.planning.cost_weights import (
-    DEFAULT_EFFORT_WEIGHT,
-    DEFAULT_ENERGY_WEIGHT,
-    MAX_RELATIVE_WEIGHT,
-    MAX_WEIGHT,
 )
 
 __all__ = [

@@ -28,6 +28,8 @@ SETTINGS = {
     interfaces.PLANNER: (
         'strategy',
         'flat_model',
+        'weights.effort',
+        'weights.energy',
         'weights.r',
         'weights.p',
         'insensitivity.stiffness',
@@ -60,11 +62,15 @@ SHOWN = {
 }
 """Parameters of these nodes that it reads only: they are chosen with the arm."""
 
+_OF_EFFORT = {'strategy': [Strategy.MIN_CONTROL_EFFORT.value, Strategy.MIXED.value]}
+_OF_ENERGY = {'strategy': [Strategy.MIN_POTENTIAL_ENERGY.value, Strategy.MIXED.value]}
 _OF_INSENSITIVE = {'strategy': [Strategy.INSENSITIVE.value]}
 
 WHEN: dict[str, dict[str, list[Any]]] = {
-    'weights.r': {'strategy': [Strategy.MIN_CONTROL_EFFORT.value, Strategy.MIXED.value]},
-    'weights.p': {'strategy': [Strategy.MIN_POTENTIAL_ENERGY.value, Strategy.MIXED.value]},
+    'weights.effort': _OF_EFFORT,
+    'weights.energy': _OF_ENERGY,
+    'weights.r': _OF_EFFORT,
+    'weights.p': _OF_ENERGY,
     'insensitivity.nominal': _OF_INSENSITIVE,
     'insensitivity.criterion': _OF_INSENSITIVE,
     'insensitivity.weight': _OF_INSENSITIVE,

@@ -82,8 +82,10 @@ def _parser() -> ArgumentParser:
     )
     control.add_argument(
         '--command-interface',
-        choices=('effort', 'position'),
-        help='of the actuated joints (default: the drive in the parameter file)',
+        choices=('effort', 'position', 'position,effort'),
+        help='of the actuated joints (default: the drive in the parameter file); a '
+        'joint_trajectory_controller with both applies the positions of the next period and the '
+        'effort of this one',
     )
     control.add_argument(
         '--hardware-param',
@@ -116,7 +118,7 @@ def _control(options: Namespace) -> ControlBlock | None:
     )
     return ControlBlock(
         plugin=options.ros2_control,
-        command_interface=drive,
+        command_interfaces=drive.split(','),
         hardware_parameters=dict(options.hardware_param),
         controllers=options.controllers,
     )

@@ -200,12 +200,12 @@ def test_a_joint_with_two_bounds_is_revolute_and_others_turn_for_ever():
     assert parse(describe(PAPER)).find('joint/limit') is None
 
 
-@pytest.mark.parametrize('interface', ['effort', 'position'])
+@pytest.mark.parametrize('interfaces', [['effort'], ['position'], ['position', 'effort']])
 @pytest.mark.parametrize('plugin', [*PLUGINS, 'my_robot/Driver'])
-def test_only_actuated_joints_are_commanded(plugin, interface):
+def test_only_actuated_joints_are_commanded(plugin, interfaces):
     control = ControlBlock(
         plugin=plugin,
-        command_interface=interface,
+        command_interfaces=interfaces,
         initial_position=[0.5, 0.0],
         hardware_parameters={'device': '/dev/ttyUSB0'},
         controllers='controllers.yaml',
@@ -218,7 +218,7 @@ def test_only_actuated_joints_are_commanded(plugin, interface):
         joint.get('name'): [c.get('name') for c in joint.findall('command_interface')]
         for joint in block.findall('joint')
     }
-    assert names == {'joint1': [interface], 'joint2': []}
+    assert names == {'joint1': interfaces, 'joint2': []}
     for joint in block.findall('joint'):
         states = [state.get('name') for state in joint.findall('state_interface')]
         assert states == ['position', 'velocity', 'effort']
@@ -230,8 +230,16 @@ def test_only_actuated_joints_are_commanded(plugin, interface):
 
 
 def test_what_cannot_be_commanded_is_refused():
-    with pytest.raises(FlatPlannerError, match='effort or position'):
-        ControlBlock(plugin='mock', command_interface='velocity')
+    for wrong in (['velocity'], [], ['effort', 'effort'], ['position', 'velocity']):
+        with pytest.raises(FlatPlannerError, match='effort, position or both'):
+            ControlBlock(plugin='mock', command_interfaces=wrong)
+
+
+def test_controllers_find_limits_of_every_joint():
+    """joint_trajectory_controller 4.39 to 4.41 ends with an exception without them."""
+    joints = parse(describe(PAPER), ControlBlock(plugin='mock')).findall('joint')
+    limits = [joint.find('limit').attrib for joint in joints if joint.get('type') != 'fixed']
+    assert limits == 2 * [{'effort': '1000000000.0', 'velocity': '1000000000.0'}]
 
 
 def test_parts_that_do_not_fit_are_refused():
