@@ -6,6 +6,7 @@ ARGS ?=
 
 # What is installed without ROS, pinned and hashed; "make LOCK=" takes the ranges of setup.py instead.
 LOCK ?= requirements.lock
+DOCS_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-docs.lock))
 PIP = $(BIN)/python -m pip install --quiet --progress-bar off
 SETUPTOOLS := 'setuptools>=70.1,<80'
 comma := ,
@@ -116,6 +117,9 @@ lock: $(MADE)  ## renew requirements.lock from the ranges of setup.py
 	echo $(SETUPTOOLS) | $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header \
 	  --no-annotate --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple \
 	  --extra jazzy --extra lint --extra plot --extra test setup.py - -o requirements.lock
+	$(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header --no-annotate \
+	  --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple \
+	  --extra docs --constraint requirements.lock setup.py -o requirements-docs.lock
 
 # The comparison goes on without libraries that cannot be had here.
 $(PEERS): setup.py $(DEPENDENCIES)
@@ -125,7 +129,10 @@ $(PEERS): setup.py $(DEPENDENCIES)
 	@rm -rf build/lib build/bdist.* *.egg-info
 	@touch $@
 
-$(SITE): setup.py $(DEPENDENCIES)
+# As DEPENDENCIES: what the lock lists by its hashes, or the ranges of setup.py.
+$(SITE): setup.py requirements-docs.lock $(DEPENDENCIES)
+	@if [ -n "$(DOCS_LOCK)" ] && $(PIP) --require-hashes -r $(DOCS_LOCK) 2>$(VENV)/docs-lock.log; then touch $@; exit 0; fi; \
+	if grep -i 'do not match the hashes' -A 8 $(VENV)/docs-lock.log 2>/dev/null >&2; then exit 1; fi; \
 	$(BIN)/python -m pip install --quiet --progress-bar off \
 	  "numpy==$$($(BIN)/python -c 'import numpy; print(numpy.__version__)')" '.[docs]'
 	@rm -rf build/lib build/bdist.* *.egg-info

@@ -15,8 +15,10 @@
 """Sphinx configuration: `make docs` builds the site into build/docs."""
 
 from importlib.util import find_spec
+import os
 from pathlib import Path
 import re
+import subprocess
 import sys
 
 HERE = Path(__file__).resolve().parent
@@ -55,12 +57,41 @@ nitpicky = False
 if find_spec('sphinx-mathjax-offline') is not None:
     extensions.append('sphinx-mathjax-offline')
 
+
+def repository():
+    """Return the address of the repository: REPOSITORY, or where this checkout comes from."""
+    address = os.environ.get('REPOSITORY', '')
+    if not address:
+        try:
+            asked = subprocess.run(
+                ['git', '-C', HERE, 'remote', 'get-url', 'origin'], capture_output=True, text=True
+            )
+        except OSError:
+            return ''
+        address = asked.stdout.strip()
+    # As a browser opens it, without what logs in.
+    address = re.sub(r'^(?:ssh://)?git@([^:/]+)[:/]', r'https://\1/', address)
+    address = re.sub(r'^(https?://)[^/@]*@', r'\1', address).removesuffix('.git')
+    return address if re.match(r'https?://', address) else ''
+
+
+if repository():
+    html_theme_options = {
+        'footer_icons': [
+            {'name': 'Repository', 'url': repository(), 'html': 'Repository', 'class': ''}
+        ]
+    }
+
 EXAMPLE = re.compile(r'^!\[[^]]*\]\(images/examples/(\w+)\.png\)$', re.MULTILINE)
 """Picture of an example, below which the site shows its source; a code host has the link above."""
 
 
 def with_sources(_app, docname, source):
-    """Put the source of each example below its picture."""
+    """Put the source of each example below its picture; link the repository on the first page."""
+    if docname == 'index' and repository():
+        source[0] = source[0].replace(
+            'the README of the repository', f'the README of the [repository]({repository()})'
+        )
     if docname == 'examples':
         below = (
             r'\g<0>\n\n```{literalinclude} ../examples/\1.py\n:language: python\n:lines: 15-\n```'

@@ -16,8 +16,8 @@
 Dual certificate: what no effort whatsoever can do.
 
 Multipliers p of the conditions at the end make a switching function s(left) of the time that is
-left. Any drive u that meets the conditions has p b = integral of s u <= peak * integral of |s|:
-a bound on the peak of every motion of this duration, and on the duration of every motion of this
+left. Any drive u that meets the conditions has p b = integral of s u <= peak * integral of
+``|s|``: a bound on the peak of every motion of this duration, and on the duration of every motion of this
 peak, whoever found p ((B7) of docs/derivation.md).
 """
 
@@ -87,12 +87,12 @@ class SwitchingFunction:
         return complex(pairs[0], -pairs[1]), complex(pairs[2], -pairs[3])
 
     def magnitude(self, duration: float) -> float:
-        """Return the integral of |s| over the times that are left of a duration."""
+        """Return the integral of ``|s|`` over the times that are left of a duration."""
         edges = np.concatenate([[0.0], self.switches(duration), [duration]])
         return float(np.abs(np.diff(self.area(edges))).sum())
 
     def magnitudes(self, durations: FloatArray) -> FloatArray:
-        """Return the integrals of |s| over the times that are left of durations, shape (m,)."""
+        """Return the integrals of ``|s|`` over the times left of durations, shape (m,)."""
         edges = np.append(0.0, self.switches(float(durations.max())))
         areas = self.area(edges)
         before = np.append(0.0, np.cumsum(np.abs(np.diff(areas))))
