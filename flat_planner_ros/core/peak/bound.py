@@ -16,8 +16,8 @@
 Dual certificate: what no effort whatsoever can do.
 
 Multipliers p of the conditions at the end make a switching function s(left) of the time that is
-left. Any drive u that meets the conditions has p b = integral of s u <= peak * integral of
-``|s|``: a bound on the peak of every motion of this duration, and on the duration of every motion of this
+left. Any drive u that meets the conditions has p b = integral of s u <= peak * integral of |s|:
+a bound on the peak of every motion of this duration, and on the duration of every motion of this
 peak, whoever found p ((B7) of docs/derivation.md).
 """
 
