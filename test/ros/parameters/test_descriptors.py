@@ -33,6 +33,7 @@ NODES = {
 }
 WITHOUT_UNIT = {
     'weights.r': 'its unit is what makes r^8 tau^2 one of the jerk-like term',
+    'model.max_imbalance': 'relative to inertias',
     'weights.effort': 'a ratio of rates',
     'weights.energy': 'a ratio of rates',
     'weights.Q': 'each entry has another one',
