@@ -51,11 +51,12 @@ test: export ROS_PYTHON_CHECK_FIELDS := 1
 test: lint  ## ruff, mypy and all tests
 	$(BIN)/python -c '$(PYTEST)' -n 2 --dist loadfile --timeout=300 $(ARGS)
 
+fuzz: export ALL_CASES := 1
 fuzz: export FUZZ_CASES ?= 100000
 fuzz: export TRUTH_CASES ?= 1000
 fuzz: export RANDOM_MESSAGES ?= 10000
 fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
-	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/wire/test_random_messages.py $(ARGS)
+	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/wire/test_random_messages.py test/core $(ARGS)
 
 soak: export PYTHONUNBUFFERED := 1
 soak: install  ## random motions with faults for a long time, MINUTES=30 by default

@@ -22,6 +22,7 @@ equal roots cost digits, of which there are plenty.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import comb, perm
 
 import mpmath as mp
@@ -74,6 +75,12 @@ def polynomial(roots: Roots) -> list[mp.mpf]:
 
 def square_roots(ascending: Sequence[float]) -> Roots:
     """Return the roots z, zero with its exact multiplicity, all others taken as simple."""
+    return list(_roots_of(tuple(ascending)))
+
+
+@lru_cache
+def _roots_of(ascending: tuple[float, ...]) -> Roots:
+    """Return the roots of an equation; the same few come up again and again."""
     with mp.workdps(DIGITS):
         coefficients = [mp.mpf(a) for a in ascending]
         zeros = next(i for i, a in enumerate(coefficients) if a)

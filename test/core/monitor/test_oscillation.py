@@ -18,6 +18,7 @@ from flat_planner_ros.core.arm.errors import InvalidRequest
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation
 import numpy as np
 import pytest
+from random_cases import cases
 from scipy.integrate import solve_ivp
 
 EXACT = 1e-6
@@ -63,7 +64,7 @@ def worst_error(fit, amplitude, frequency, ratio):
 def test_exact_samples_give_back_the_oscillation(is_irregular):
     rng = np.random.default_rng(1)
     errors = []
-    for _ in range(150):
+    for _ in range(cases(150)):
         frequency = 10 ** rng.uniform(-1.0, np.log10(50.0))
         ratio = rng.choice((0.0, rng.uniform(0.0, 0.02), rng.uniform(0.0, 0.3)))
         amplitude = 10 ** rng.uniform(-9.0, 0.0)
@@ -79,7 +80,7 @@ def test_exact_samples_give_back_the_oscillation(is_irregular):
         fit = fit_oscillation(end + elapsed, values, end)
         assert fit.reason == ''
         errors.append(worst_error(fit, amplitude, frequency, ratio))
-    assert len(errors) == 150
+    assert len(errors) == cases(150)
     assert max(errors) < EXACT
 
 
@@ -109,7 +110,7 @@ def test_noise_adds_no_bias_and_the_standard_errors_are_true(
     frequency, ratio, amplitude, duration
 ):
     rng = np.random.default_rng(2)
-    runs = 100
+    runs = cases(100, 2)
     truth = np.array((amplitude, frequency, rates(frequency, ratio)[1]))
     deviations = []
     elapsed = grid(duration, sampling(frequency))
@@ -129,7 +130,7 @@ def test_noise_adds_no_bias_and_the_standard_errors_are_true(
 
 def test_noise_alone_is_not_taken_for_an_oscillation():
     rng = np.random.default_rng(3)
-    for _ in range(150):
+    for _ in range(cases(150)):
         times = np.arange(rng.integers(12, 400)) / 200.0
         fit = fit_oscillation(times, 0.3 + NOISE * rng.standard_normal(times.size), 0.0)
         assert fit.frequency is None
@@ -193,17 +194,17 @@ def test_repeated_times_are_too_few():
 def test_any_number_of_samples_and_periods_is_answered():
     rng = np.random.default_rng(7)
     found = 0
-    for _ in range(200):
+    for _ in range(cases(200)):
         times = np.sort(rng.uniform(0.0, 1.0, rng.integers(12, 60)))
         fit = fit_oscillation(times, np.cos(2 * np.pi * rng.uniform(0.1, 9.0) * times), 0.0)
         assert (fit.frequency is None) == bool(fit.reason)
         found += fit.frequency is not None
-    assert found > 100
+    assert found > cases(200) / 2
 
 
 def test_a_spike_without_a_peak_in_its_spectrum_is_answered():
     rng = np.random.default_rng(8)
-    for _ in range(300):
+    for _ in range(cases(300)):
         times = np.sort(rng.random(14))
         values = np.where(np.arange(14) == rng.integers(14), 1.0, 0.0)
         fit = fit_oscillation(times, values, 0.0)

@@ -26,6 +26,7 @@ from flat_planner_ros.core.motion_law.extremal import (
 import numpy as np
 from numpy.polynomial import legendre, Polynomial
 import pytest
+from random_cases import cases
 from scipy.special import jacobi
 
 TOLERANCE = 1e-9
@@ -176,7 +177,7 @@ def test_general_ends_of_every_cost(oracle, name):
 def test_general_ends_of_random_costs(oracle):
     rng = np.random.default_rng(4)
     checked = 0
-    for _ in range(40):
+    for _ in range(cases(40)):
         matrix = random_semidefinite(rng, int(rng.integers(1, 7)))
         coefficients = QuadraticCost(matrix=matrix).characteristic()
         duration = 10.0 ** rng.uniform(-2, 1)
@@ -186,7 +187,7 @@ def test_general_ends_of_random_costs(oracle):
         reference = oracle.solve(oracle.square_roots(coefficients), duration, jets.start, jets.end)
         assert relative_error(law.jet(times, 6), reference.jet(times, 6)) <= TOLERANCE
         checked += 1
-    assert checked == 40
+    assert checked == cases(40)
 
 
 @pytest.mark.parametrize('name', MATRICES)

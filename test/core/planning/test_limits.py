@@ -33,7 +33,7 @@ from scipy.optimize import brentq
 ACCURACY = 1e-6
 """Of an extremum, relative to the range that its quantity covers [-]."""
 
-DENSE = 100_000
+DENSE = 40_000
 
 RANDOM_CASES = 40
 

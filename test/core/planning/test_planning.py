@@ -31,6 +31,7 @@ from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.simulation import rollout
 import numpy as np
 import pytest
+from random_cases import cases
 from scipy.integrate import trapezoid
 
 extremals = import_module('flat_planner_ros.core.motion_law.extremal')
@@ -42,7 +43,7 @@ REFERENCE = json.loads(
 TOLERANCE = 1e-9
 """Largest error of a derivative, relative to its peak [-]."""
 
-RANDOM_CASES = 250
+RANDOM_CASES = cases(250)
 
 PAPER = FlatModel.APPROXIMATE
 """The reference numbers are those of the paper's torque."""

@@ -80,7 +80,7 @@ def motions(arm, final, start=None, **options):
 
 def uses_of(planned, limits):
     """Return how often limits of velocity and effort are used up, by dense sampling."""
-    samples = planned.at(np.linspace(0.0, planned.duration, 100_001))
+    samples = planned.at(np.linspace(0.0, planned.duration, 20_001))
     velocity, effort = np.abs(samples.velocities).max(axis=0), np.abs(samples.efforts).max(axis=0)
     return max((velocity / limits.velocity).max(), (effort / limits.effort).max())
 
