@@ -34,9 +34,7 @@ def simulated(effort, times, *, both, last, spring, viscous=0.0, start=(0.0, 0.0
         return [x[2], x[3], inner, -pull / last - inner]
 
     tolerances = {'rtol': 1e-9, 'atol': 1e-10}
-    found = solve_ivp(
-        rates, (0.0, times[-1]), start, t_eval=times, method='DOP853', **tolerances
-    )
+    found = solve_ivp(rates, (0.0, times[-1]), start, t_eval=times, method='DOP853', **tolerances)
     return found.y[:2].T
 
 
