@@ -133,6 +133,8 @@ def main() -> int:
     parser.add_argument('--times', type=int, default=1000)
     parser.add_argument('--seed', type=int, default=1)
     options = parser.parse_args()
+    # A shell's background job ignores it, and so would what it starts.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with free_domain() as domain:
         wrong = []
         for count in range(options.times):

@@ -54,6 +54,7 @@ from flat_planner_ros.core.arm.samples import (
     travel,
     TurnCounter,
 )
+from flat_planner_ros.core.arm.sparse_points import sparse_rows
 from flat_planner_ros.core.arm.urdf import (
     ArmDescription,
     ControlBlock,
@@ -101,6 +102,7 @@ __all__ = [
     'PLUGINS',
     'SampledMotion',
     'SampleTable',
+    'sparse_rows',
     'strict_arithmetic',
     'suggest_counterbalances',
     'travel',

@@ -18,6 +18,7 @@ from flat_planner_ros.core.session import Track
 from flat_planner_ros.ros.nodes.graph_watch import unheard
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
+from flat_planner_ros.ros.wire.command_form import WHOLE
 from flat_planner_ros.ros.wire.message_types import message_class
 from rclpy.node import Node
 
@@ -47,16 +48,9 @@ class CommandOutlet:
         joints = settings.session.joints
         plan = conversions.command_bytes(track, joints)
         if settings.session.execute:
-            is_whole = settings.include_passive_joint and settings.include_effort
             command = plan
-            if not (is_whole and settings.session.is_stamped):
-                command = conversions.command_bytes(
-                    track,
-                    joints,
-                    include_passive_joint=settings.include_passive_joint,
-                    include_effort=settings.include_effort,
-                    absolute_stamp=settings.session.is_stamped,
-                )
+            if settings.command != WHOLE:
+                command = conversions.command_bytes(track, joints, settings.command)
             self._command.publish(command)
         self._plan.publish(plan)
         self._flat_plan.publish(conversions.flat_plan_bytes(track))

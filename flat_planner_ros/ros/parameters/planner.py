@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isqrt
 
-from flat_planner_ros.core.arm import Drive, FlatModel, JointStateRules
+from flat_planner_ros.core.arm import Drive, FlatModel, InvalidCommand, JointStateRules
 from flat_planner_ros.core.motion_law import QuadraticCost, Strategy
 from flat_planner_ros.core.planning import (
     check_options,
@@ -47,6 +47,7 @@ from flat_planner_ros.ros.parameters.row import (
     Row,
     Values,
 )
+from flat_planner_ros.ros.wire.command_form import CommandForm
 import numpy as np
 
 
@@ -68,7 +69,7 @@ class PlannerSettings:
         Settings of its session.
     joint_states
         How they are read.
-    include_passive_joint, include_effort
+    command
         Form of the command.
     reference_rate
         Rate of `~/reference` [Hz].
@@ -85,8 +86,7 @@ class PlannerSettings:
 
     session: SessionSettings
     joint_states: JointStateRules
-    include_passive_joint: bool
-    include_effort: bool
+    command: CommandForm
     reference_rate: float
     auto_tune: bool
     report_advice: bool
@@ -269,6 +269,17 @@ ROWS = [
     ),
     Row('command.include_passive_joint', True, '', 'name the passive joint in the command'),
     Row('command.include_effort', True, '', 'put the feed-forward effort into the command'),
+    Row('command.include_acceleration', True, '', 'put accelerations into the command'),
+    Row(
+        'command.tolerance',
+        0.0,
+        'rad',
+        'leave out the points that cubic interpolation of positions and velocities does not need '
+        'for this; 0 = none',
+        'without efforts only, which are joined by straight lines',
+        lower=0.0,
+        upper=0.001,
+    ),
     Row(
         'command.stamp',
         CommandStamp.ABSOLUTE,
@@ -377,8 +388,7 @@ def build(values: Values) -> PlannerSettings:
     return PlannerSettings(
         session=session,
         joint_states=joint_state_rules(values),
-        include_passive_joint=values['command.include_passive_joint'],
-        include_effort=values['command.include_effort'],
+        command=_command_form(values),
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
         report_advice=values['report_advice'],
@@ -386,6 +396,23 @@ def build(values: Values) -> PlannerSettings:
         stream_effort=values['stream_effort'],
         save_path=values['save_model.path'],
     )
+
+
+def _command_form(values: Values) -> CommandForm:
+    """Return what commands contain."""
+    form = CommandForm(
+        include_passive_joint=values['command.include_passive_joint'],
+        include_acceleration=values['command.include_acceleration'],
+        include_effort=values['command.include_effort'],
+        absolute_stamp=CommandStamp(values['command.stamp']) is CommandStamp.ABSOLUTE,
+        tolerance=values['command.tolerance'],
+    )
+    if form.tolerance and form.include_effort:
+        raise InvalidCommand(
+            f'command.tolerance = {form.tolerance:g} rad needs command.include_effort: false; '
+            'efforts are joined by straight lines and would not be those planned'
+        )
+    return form
 
 
 def _custom_cost(values: Values) -> np.ndarray | None:

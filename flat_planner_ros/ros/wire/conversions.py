@@ -18,12 +18,19 @@ from array import array
 from collections.abc import Sequence
 from typing import TypeVar
 
-from flat_planner_ros.core.arm import Drive, FloatArray, InvalidCommand, InvalidRequest
+from flat_planner_ros.core.arm import (
+    Drive,
+    FloatArray,
+    InvalidCommand,
+    InvalidRequest,
+    sparse_rows,
+)
 from flat_planner_ros.core.monitor import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.plant import ArmState, EffortProfile
 from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
 from flat_planner_ros.ros.wire import stamps
+from flat_planner_ros.ros.wire.command_form import CommandForm, WHOLE
 from flat_planner_ros.ros.wire.point_reader import (
     FIELDS,
     joints_in_words,
@@ -277,22 +284,23 @@ def _refuse_other_passive_joint(
         )
 
 
-def command_bytes(
-    track: Track,
-    joints: Sequence[str],
-    *,
-    include_passive_joint: bool = True,
-    include_effort: bool = True,
-    absolute_stamp: bool = True,
-) -> bytes:
+def command_bytes(track: Track, joints: Sequence[str], form: CommandForm = WHOLE) -> bytes:
     """Return a command, serialised, as joint_trajectory_controller plays it."""
-    count = len(joints) if include_passive_joint else len(joints) - 1
-    tables = [track.positions, track.velocities, track.accelerations]
-    if include_effort:
-        tables.append(track.efforts)
-    start = track.start if absolute_stamp else 0.0
-    tables = [table[:, :count] for table in tables]
-    return trajectory_bytes(joints[:count], stamps.sec_and_nanosec(start), track.times, tables)
+    count = len(joints) if form.include_passive_joint else len(joints) - 1
+    columns = slice(count)
+    nothing = slice(0)
+    tables = [
+        track.positions[:, columns],
+        track.velocities[:, columns],
+        track.accelerations[:, columns if form.include_acceleration else nothing],
+        track.efforts[:, columns if form.include_effort else nothing],
+    ]
+    times = track.times
+    if form.tolerance:
+        rows = sparse_rows(times, tables[0], tables[1], form.tolerance)
+        times, tables = times[rows], [table[rows] for table in tables]
+    start = track.start if form.absolute_stamp else 0.0
+    return trajectory_bytes(joints[:count], stamps.sec_and_nanosec(start), times, tables)
 
 
 def flat_plan_bytes(track: Track) -> bytes:

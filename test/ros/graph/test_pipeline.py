@@ -105,15 +105,20 @@ def test_replan_repeats_the_last_goal(graph):
     assert suite.states[-1].position[0] == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize('bandwidth', [0.0, 20.0])
-def test_servos_leave_what_is_predicted_for_servos(graph, bandwidth):
+@pytest.mark.parametrize(('bandwidth', 'tolerance'), [(0.0, 1e-6), (20.0, 0.0)])
+def test_servos_leave_what_is_predicted_for_servos(graph, bandwidth, tolerance):
     heavy = {
         'joints': ['joint1', 'joint2'],
         'model.inertia_star': [6.4e-4, 2.5e-4],
         'model.stiffness': 2.3e-2,
         'model.damping': 2.0e-5,
     }
-    command = {'command.include_effort': False, 'command.include_passive_joint': False}
+    command = {
+        'command.include_effort': False,
+        'command.include_passive_joint': False,
+        'command.include_acceleration': False,
+        'command.tolerance': tolerance,
+    }
     softer = {'mismatch.stiffness_scale': 0.9, 'servo.bandwidth': bandwidth}
     suite = Suite(
         graph,
@@ -123,5 +128,6 @@ def test_servos_leave_what_is_predicted_for_servos(graph, bandwidth):
     )
     verdict, report = suite.carry_out(pi, 1.2)
     assert float(verdict['predicted_residual_worst']) < 0.006
+    assert (len(suite.commands[-1].points) < 150) == bool(tolerance)
     left = float(report['amplitude'])
     assert 5e-4 < left <= float(verdict['predicted_residual_worst']) * 1.02
