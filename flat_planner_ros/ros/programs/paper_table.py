@@ -64,8 +64,8 @@ WINDOW = 3.0
 SILENCE = 5.0
 """Real time for which a busy machine may be silent [s]."""
 
-TERMINATION = 5.0
-"""Time that a node is given to end by itself [s]."""
+TERMINATION = 10.0
+"""Time that a node is given to end by itself [s]: twice what it takes to end for certain."""
 
 SHOWN_AS_DECIMAL = 1e-4
 """Amplitude from which the table shows decimals rather than an exponent [rad]."""
@@ -254,6 +254,7 @@ def _node_processes(speed: float, drive: Drive) -> Iterator[list[subprocess.Pope
                 process.wait(TERMINATION)
             except subprocess.TimeoutExpired:
                 process.kill()
+                process.wait()
 
 
 def _row(result: Result) -> str:
