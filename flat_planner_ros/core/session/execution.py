@@ -153,10 +153,19 @@ def clock_fault(why: str, jump: float) -> Shortfall:
 
 
 class ExecutionWatch:
-    """Compares what is measured with what is planned; whatever it finds is said once."""
+    """
+    Compares what is measured with what is planned; whatever it finds is said once.
+
+    Attributes
+    ----------
+    answer
+        What the controller says of the last command that it was sent, a clause; empty before.
+
+    """
 
     def __init__(self) -> None:
         """Watch nothing."""
+        self.answer = ''
         self._arrivals: list[_Arrival] = []
         self._checked = -inf
         self._told = 0
@@ -178,6 +187,11 @@ class ExecutionWatch:
         """Return, once, the motions that the arm has left."""
         astray, self._astray = self._astray, []
         return astray
+
+    @property
+    def expected(self) -> list[Motion]:
+        """Return the motions whose time is over, and of whose end nothing was said yet."""
+        return [arrival.motion for arrival in self._arrivals]
 
     def expect(self, motion: Motion) -> None:
         """Look for the arm at the end of a motion whose time is over."""
@@ -208,18 +222,32 @@ class ExecutionWatch:
         ended = []
         while self._arrivals:
             verdict = self._arrivals[0].verdict(settings, timeline, measured, now)
-            if verdict is None:
+            if verdict is None or self._awaits_answer(settings, timeline, now):
                 break
-            ended.append(verdict)
+            ended.append(self._with_answer(settings, timeline, verdict))
             del self._arrivals[0]
         return ended
+
+    def _awaits_answer(self, settings: SessionSettings, timeline: Timeline, now: float) -> bool:
+        """Tell whether the controller is to say something of the last motion, and may still."""
+        if not settings.awaits_answer or self.answer or timeline.last is not None:
+            return False
+        last = self._arrivals[-1].motion
+        return len(self._arrivals) == 1 and now < last.end + settings.finish_patience
+
+    def _with_answer(self, settings: SessionSettings, timeline: Timeline, ended: Ended) -> Ended:
+        """Return the end of a motion with what the controller says of it, if it is the last."""
+        if not settings.awaits_answer or timeline.last is not None or len(self._arrivals) > 1:
+            return ended
+        said = self.answer or 'the controller has not answered'
+        return ended._replace(remark='; '.join(filter(None, (ended.remark, said))))
 
 
 class _Arrival:
     """A motion whose time is over, until it is known whether the arm is there."""
 
     def __init__(self, motion: Motion) -> None:
-        self._motion = motion
+        self.motion = motion
         self._base: tuple[float, FloatArray] | None = None
         self._drift: FloatArray | float = np.nan
 
@@ -231,7 +259,7 @@ class _Arrival:
         now: float,
     ) -> Ended | None:
         """Return how the motion has ended, None while that is not to be said yet."""
-        motion = self._motion
+        motion = self.motion
         as_planned = Outcome.STOPPED if motion.is_stop else Outcome.FINISHED
         if settings.finish_tolerance == 0.0:
             return Ended(motion, as_planned)
@@ -254,7 +282,7 @@ class _Arrival:
         is_over: bool,
     ) -> Shortfall | None:
         """Return what the arm lacks of being there at rest; where it is to be may move on."""
-        wanted = (timeline.at(measured.time) or self._motion).reference(measured.time)
+        wanted = (timeline.at(measured.time) or self.motion).reference(measured.time)
         off = (measured.positions - wanted.positions[0])[:-1]
         tolerance = settings.finish_tolerance
         for joint, name in enumerate(settings.joints[:-1]):
@@ -287,7 +315,7 @@ class _Arrival:
 
     def _stillness(self, measured: JointSample) -> str:
         """Return that nothing has moved, if so."""
-        start = self._motion.plan.request.start
+        start = self.motion.plan.request.start
         moved = np.abs(measured.positions - start)[:-1].max()
         return ': the arm has not moved' if moved <= STILL else ''
 

@@ -68,6 +68,8 @@ class Goal:
     start
         Where the actuated joints are at the start, as the sender believes, in kinematic order
         [rad]; None where nothing is said. Only a checked goal has it: a first point at time 0.
+    remarks
+        Clauses on what was changed about it.
 
     """
 
@@ -75,6 +77,7 @@ class Goal:
     points: tuple[GoalPoint, ...]
     stamp: float | None = None
     start: tuple[float, ...] | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def begins_with_start(self) -> bool:
@@ -128,7 +131,33 @@ def checked_goal(goal: Goal, joints: Sequence[str]) -> Goal:
     if goal.begins_with_start:
         said = dict(zip(goal.joint_names, goal.points[0].positions, strict=True))
         start = tuple(said[name] for name in joints[:-1])
-    return Goal(joint_names=tuple(joints), points=points, stamp=goal.stamp, start=start)
+    return Goal(
+        joint_names=tuple(joints),
+        points=points,
+        stamp=goal.stamp,
+        start=start,
+        remarks=goal.remarks,
+    )
+
+
+def path_goal(goal: Goal) -> Goal:
+    """
+    Return the goal to pass the points of a trajectory that a motion planner has made.
+
+    Its velocities and accelerations on the way are those of another law, and its points are many:
+    both are left out as far as no goal can have them, which the remarks say.
+    """
+    first = 1 if goal.begins_with_start else 0
+    way = [replace(point, velocities=(), accelerations=()) for point in goal.points[first:-1]]
+    remarks = []
+    if any(any(point.velocities + point.accelerations) for point in goal.points[first:-1]):
+        remarks.append('its velocities and accelerations on the way are left to the planner')
+    room = MAX_POINTS - 1 - first
+    if len(way) > room:
+        remarks.append(f'{room} of its {len(way)} points on the way are passed')
+        way = [way[(2 * k + 1) * len(way) // (2 * room)] for k in range(room)]
+    points = (*goal.points[:first], *way, *goal.points[-1:])
+    return replace(goal, points=points, remarks=tuple(remarks))
 
 
 def check_point_count(count: int) -> None:

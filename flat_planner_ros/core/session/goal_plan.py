@@ -35,6 +35,7 @@ from flat_planner_ros.core.planning import (
     PlanningOptions,
     Reason,
     RequestRejected,
+    stop_plan,
     ViaPoint,
     with_via_times,
 )
@@ -42,6 +43,7 @@ from flat_planner_ros.core.session.caught_start import patience, swing_time
 from flat_planner_ros.core.session.goal import Goal
 from flat_planner_ros.core.session.motion_start import MotionStart
 from flat_planner_ros.core.session.settings import SessionSettings, SettlePose
+from flat_planner_ros.core.session.timeline import Motion
 import numpy as np
 
 NOMINAL_DURATION = 1.0
@@ -121,6 +123,12 @@ def settling_plan(settings: SessionSettings, start: MotionStart, last: FloatArra
         usual = settings.default_duration or swing_time(settings)
         duration = min(max(usual, rules.shortest), rules.longest)
         return rules.plan_within(request(duration), arm, options, is_prescribed=True)[0]
+
+
+def stopping_plan(settings: SessionSettings, start: MotionStart, running: Motion) -> Plan:
+    """Return the plan that brings a running motion to rest early, from a start in its midst."""
+    limits = settings.duration_rules(start.pose).limits
+    return stop_plan(running.plan, start.pose, start.jets, running.end - start.time, limits)
 
 
 def _model(settings: SessionSettings, start: MotionStart) -> tuple[PlanarArm, PlanningOptions]:

@@ -252,6 +252,15 @@ def _waiting(running: Motion, stamp: float | None) -> MotionStart:
     return MotionStart(time, request.start, request.start_jets, running)
 
 
+def check_time(now: float) -> None:
+    """Refuse to plan before there is a time."""
+    if now <= 0.0:
+        raise RequestRejected(
+            Reason.START_STATE_UNKNOWN,
+            'there is no time yet: use_sim_time is set, but no /clock has been received',
+        )
+
+
 def check_stamp(stamp: float | None, now: float) -> None:
     """Refuse a start in the past, or so far ahead that nobody waits for it [s]."""
     if stamp is not None and stamp - now > MAX_AHEAD:

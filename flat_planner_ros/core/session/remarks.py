@@ -55,6 +55,7 @@ def remarks_on(
             f'it starts in {ahead:.0f} s only (start.far_ahead {settings.far_ahead:g} s): do the '
             f'sender and the planner go by the same clock (use_sim_time)?'
         )
+    yield from goal.remarks
     yield from _remarks_on_start(settings, goal, start)
     yield from turns_remarks(settings, goal, start.pose)
 

@@ -24,7 +24,6 @@ from flat_planner_ros.core.planning import (
     PlanSamples,
     Reason,
     RequestRejected,
-    stop_plan,
 )
 from flat_planner_ros.core.session.caught_start import is_moving
 from flat_planner_ros.core.session.delivery import Delivery
@@ -37,9 +36,10 @@ from flat_planner_ros.core.session.execution import (
     Shortfall,
 )
 from flat_planner_ros.core.session.goal import checked_goal, Goal
-from flat_planner_ros.core.session.goal_plan import plan_of_goal, settling_plan
+from flat_planner_ros.core.session.goal_plan import plan_of_goal, settling_plan, stopping_plan
 from flat_planner_ros.core.session.motion_start import (
     check_stamp,
+    check_time,
     motion_start,
     MotionStart,
     start_in_motion,
@@ -131,12 +131,22 @@ class PlannerSession:
     def drop(self, fault: Shortfall) -> int:
         """Give up all that is planned, and what is measured. Return how many motions fail."""
         last = self._recent.last
-        failed = [Ended(m, Outcome.FAILED, fault) for m in self._timeline.motions if m.cut is None]
         self._ended += self._watch.take_arrived(self.settings, self._timeline, last, inf)
-        self._ended += failed
-        self._timeline, self._motion = Timeline(), None
-        self._recent, self._watch, self._delivery = RecentStates(), ExecutionWatch(), Delivery()
+        failed = self.give_up(fault)
+        self._recent, self._delivery = RecentStates(), Delivery()
+        return failed
+
+    def give_up(self, fault: Shortfall) -> int:
+        """Give up all that is planned or was not seen to end. Return how many motions fail."""
+        planned = [motion for motion in self._timeline.motions if motion.cut is None]
+        failed = [*self._watch.expected, *planned]
+        self._ended += [Ended(motion, Outcome.FAILED, fault) for motion in failed]
+        self._timeline, self._motion, self._watch = Timeline(), None, ExecutionWatch()
         return len(failed)
+
+    def answered(self, words: str) -> None:
+        """Take what the controller says of a command that it has carried out, a clause."""
+        self._watch.answer = words
 
     def knows_start(self, now: float) -> bool:
         """Tell whether goals can be judged: there is a time [s], and a state where one counts."""
@@ -186,7 +196,7 @@ class PlannerSession:
         settings = self._applied
         asked = checked_goal(goal, settings.joints)
         duration = settings.checked_duration(asked.duration)
-        _check_time(now)
+        check_time(now)
         start = self._start(goal.stamp, now)
         if start.running is not None:
             check_carried_out(settings, self._timeline, self._recent.last, now)
@@ -225,7 +235,7 @@ class PlannerSession:
             planned is untouched.
 
         """
-        _check_time(now)
+        check_time(now)
         settings, timeline = self._applied, self._timeline
         if not timeline.is_busy(now) and not is_moving(settings, timeline, self._recent):
             return None
@@ -260,7 +270,7 @@ class PlannerSession:
             The arm cannot be brought to rest any sooner; all that is planned is untouched.
 
         """
-        _check_time(now)
+        check_time(now)
         if not self._timeline.is_busy(now):
             return None
         start = self._start(None, now)
@@ -269,17 +279,9 @@ class PlannerSession:
             raise RequestRejected(
                 Reason.BUSY, 'the arm comes to rest within replan.lookahead as it is'
             )
-        limits = self.settings.duration_rules(start.pose).limits
-        remaining = running.end - start.time
-        planned = stop_plan(running.plan, start.pose, start.jets, remaining, limits)
-        motion = Motion(
-            plan_id=running.plan_id,
-            plan=planned,
-            samples=planned.sample(self.settings.period),
-            start=start.time,
-            planned_at=now,
-            is_stop=True,
-        )
+        motion = self._motion_of(stopping_plan(self.settings, start, running), start, now)
+        motion = replace(motion, plan_id=running.plan_id, is_stop=True, swing=None)
+        motion = replace(motion, replaced_strategy=None)
         return self._accepted(motion, start, None, clock)
 
     def take_ended(self, now: float) -> list[Ended]:
@@ -312,9 +314,13 @@ class PlannerSession:
         """Tell whether any motion is planned for part of a time [s]."""
         return self._timeline.moves(since, until)
 
+    def under_way(self, now: float) -> Motion | None:
+        """Return the motion in force at a time [s], or the first to come; None if none is left."""
+        return self._timeline.at(now)
+
     def reference(self, now: float) -> PlanSamples | None:
         """Return what is planned for the present, at rest before and after; one sample."""
-        motion = self._timeline.at(now) or self._motion
+        motion = self.under_way(now) or self._motion
         return None if motion is None else motion.reference(now)
 
     def _motion_of(self, found: Plan, start: MotionStart, now: float) -> Motion:
@@ -358,6 +364,7 @@ class PlannerSession:
                 if not (motion.is_stop and old.plan_id == motion.plan_id):
                     self._ended.append(Ended(old, Outcome.PREEMPTED))
             self._timeline = self._timeline.with_motion(motion)
+            self._watch.answer = ''
         self._count = max(self._count, motion.plan_id)
         self._motion = motion
         return motion
@@ -389,12 +396,3 @@ class PlannerSession:
     def _last_pose(self) -> FloatArray | None:
         """Return the end of the last motion, None if there has been none."""
         return None if self._motion is None else self._motion.plan.request.final
-
-
-def _check_time(now: float) -> None:
-    """Refuse to plan before there is a time."""
-    if now <= 0.0:
-        raise RequestRejected(
-            Reason.START_STATE_UNKNOWN,
-            'there is no time yet: use_sim_time is set, but no /clock has been received',
-        )

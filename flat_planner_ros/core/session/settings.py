@@ -140,6 +140,8 @@ class SessionSettings:
         take over from another.
     execute
         Whether motions are carried out; if not, none keeps the session busy.
+    awaits_answer
+        Whether the controller says itself how a command has ended, which belongs to the end.
 
     """
 
@@ -171,6 +173,7 @@ class SessionSettings:
     finish_patience: float = 1.0
     is_stamped: bool = True
     execute: bool = True
+    awaits_answer: bool = False
 
     def __post_init__(self) -> None:
         """Refuse settings that contradict each other."""

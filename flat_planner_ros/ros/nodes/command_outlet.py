@@ -14,30 +14,41 @@
 
 """Outlet of commands and plans: what is to be carried out, as executors and viewers take it."""
 
-from flat_planner_ros.core.session import Track
+from flat_planner_ros.core.session import PlannerSession, Track
+from flat_planner_ros.ros.nodes.controller_client import ControllerClient
 from flat_planner_ros.ros.nodes.graph_watch import unheard
+from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
 from flat_planner_ros.ros.wire.command_form import WHOLE
-from flat_planner_ros.ros.wire.message_types import message_class
-from rclpy.node import Node
+from flat_planner_ros.ros.wire.message_types import message_class, UnknownType
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 
 
 class CommandOutlet:
     """
-    Publishes commands, plans and flat plans.
+    Sends commands, on their topic or as goals of a controller; publishes plans and flat plans.
 
     Parameters
     ----------
     node
         Node that plans.
+    session
+        Session that is told what a controller answers.
+    action
+        Name of the controller's action; empty for the topic.
+
+    Raises
+    ------
+    UnknownType
+        An action is asked for, and control_msgs is not installed.
 
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GuardedNode, session: PlannerSession, action: str) -> None:
         self._node = node
+        self._controller = _controller(node, session, action) if action else None
         kind = message_class(JOINT_TRAJECTORY)
         self._command = node.create_publisher(kind, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = node.create_publisher(kind, interfaces.PLAN, interfaces.LATCHED)
@@ -51,7 +62,10 @@ class CommandOutlet:
             command = plan
             if settings.command != WHOLE:
                 command = conversions.command_bytes(track, joints, settings.command)
-            self._command.publish(command)
+            if self._controller is None:
+                self._command.publish(command)
+            else:
+                self._controller.send(command)
         self._plan.publish(plan)
         self._flat_plan.publish(conversions.flat_plan_bytes(track))
 
@@ -59,5 +73,18 @@ class CommandOutlet:
         """Return that nobody hears the commands, a clause; empty if somebody does or need not."""
         if not settings.session.execute:
             return ''
+        if self._controller is not None:
+            return self._controller.doubt
         streams = [interfaces.EFFORT_COMMANDS] if settings.stream_effort else []
         return unheard(self._node, interfaces.COMMAND, *streams)
+
+
+def _controller(node: GuardedNode, session: PlannerSession, action: str) -> ControllerClient:
+    """Return the client of a controller's action."""
+    try:
+        return ControllerClient(node, session, action)
+    except UnknownType as error:
+        raise UnknownType(
+            f'command.interface: action needs control_msgs ({error}): install '
+            f'ros-$ROS_DISTRO-control-msgs, or set command.interface: topic'
+        ) from error

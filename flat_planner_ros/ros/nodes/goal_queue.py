@@ -17,6 +17,7 @@
 from collections import deque
 from collections.abc import Callable
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.core.session import Goal, PlannerSession
 from flat_planner_ros.ros.wire import interfaces, stamps
@@ -28,6 +29,13 @@ LOOK_PERIOD = 0.05
 
 Read = Callable[[], Goal]
 """What reads a goal; may refuse it."""
+
+Tell = Callable[[DiagnosticStatus], object]
+"""What else is to be told the verdict on a goal."""
+
+
+def tell_nobody(_: DiagnosticStatus) -> None:
+    """Leave a verdict to those who listen to the status."""
 
 
 class GoalQueue:
@@ -41,35 +49,35 @@ class GoalQueue:
     session
         Session that knows how long a goal may wait.
     answer
-        Gives a goal its verdict.
+        Gives a goal its verdict, and tells it.
 
     """
 
     def __init__(
-        self, node: Node, session: PlannerSession, answer: Callable[[Read], object]
+        self, node: Node, session: PlannerSession, answer: Callable[[Read, Tell], object]
     ) -> None:
         self._node = node
         self._session = session
         self._answer = answer
-        self._waiting: deque[tuple[Read, float]] = deque()
+        self._waiting: deque[tuple[Read, Tell, float]] = deque()
         # Steady: a simulated clock may be what goals wait for.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_PERIOD, self.answer_due, clock=self._steady)
 
-    def put(self, read: Read) -> None:
+    def put(self, read: Read, tell: Tell = tell_nobody) -> None:
         """Take a goal."""
-        self._waiting.append((read, stamps.now(self._steady) + self._patience(read)))
+        self._waiting.append((read, tell, stamps.now(self._steady) + self._patience(read)))
         self.answer_due()
 
     def answer_due(self) -> None:
         """Hand on all goals that need not wait any longer."""
-        while self._waiting and self._is_due(self._waiting[0][1]):
-            self._answer(self._waiting.popleft()[0])
+        while self._waiting and self._is_due(self._waiting[0][-1]):
+            self._answer(*self._waiting.popleft()[:-1])
 
     def answer_all(self) -> None:
         """Hand on all goals, whether they can be judged or not."""
         while self._waiting:
-            self._answer(self._waiting.popleft()[0])
+            self._answer(*self._waiting.popleft()[:-1])
 
     def _is_due(self, until: float) -> bool:
         """Tell whether the first goal, which may wait until a time [s], is to be handed on."""

@@ -51,26 +51,26 @@ class GuardedNode(Node):
         self, kind: Any, topic: str, callback: Callable[..., Any], *args: Any, **options: Any
     ) -> Any:
         """Subscribe as rclpy does; a message that cannot be taken is lost."""
-        guarded = self._guard(callback, f'a message on {topic}')
+        guarded = self.guarded(callback, f'a message on {topic}')
         return super().create_subscription(kind, topic, guarded, *args, **options)
 
     def create_timer(  # type: ignore[override]
         self, period: float, callback: Callable[..., Any], *args: Any, **options: Any
     ) -> Any:
         """Make a timer as rclpy does; a tick that fails is lost."""
-        guarded = self._guard(callback, 'a tick')
+        guarded = self.guarded(callback, 'a tick')
         return super().create_timer(period, guarded, *args, **options)
 
     def create_service(  # type: ignore[override]
         self, kind: Any, name: str, callback: Callable[..., Any], *args: Any, **options: Any
     ) -> Any:
         """Offer a service as rclpy does; a request that cannot be served fails."""
-        guarded = self._guard(callback, f'a request to {name}', is_request=True)
+        guarded = self.guarded(callback, f'a request to {name}', is_request=True)
         if kind is SetParameters:
             guarded = _one_by_one(guarded)
         return super().create_service(kind, name, guarded, *args, **options)
 
-    def _guard(
+    def guarded(
         self, callback: Callable[..., Any], what: str, *, is_request: bool = False
     ) -> Callable[..., Any]:
         """Return a callback that raises nothing."""

@@ -28,16 +28,19 @@ from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
 from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
-from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
+from flat_planner_ros.ros.nodes.goal_queue import GoalQueue, Read, Tell, tell_nobody
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import planner_sentence
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.nodes.rest_services import RestServices
+from flat_planner_ros.ros.nodes.trajectory_server import TrajectoryServer
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.message_types import UnknownType
 from flat_planner_ros.ros.wire.verdict_text import log_line
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -74,11 +77,8 @@ class PlannerNode(GuardedNode):
             lambda: self._configuration.values,
         )
         self.create_service(Trigger, interfaces.REPLAN, self._on_replan)
-        for service, act, nothing in (
-            (interfaces.STOP, self._session.stop, 'nothing to stop: no motion is under way'),
-            (interfaces.SETTLE, self._session.settle, 'nothing to settle: the arm is at rest'),
-        ):
-            self.create_service(Trigger, service, partial(self._bring_to_rest, act, nothing))
+        rest = RestServices(self, self._session, self._goals, self._carry_out)
+        self._actions = self._offer_action(rest)
         self.create_timer(1.0 / self._settings.reference_rate, self._on_tick)
         commands = [interfaces.COMMAND, interfaces.EFFORT_COMMANDS]
         self._watch = GraphWatch(
@@ -90,7 +90,7 @@ class PlannerNode(GuardedNode):
 
     def _open_publishers(self) -> None:
         """Offer commands, plans and verdicts."""
-        self._outlet = CommandOutlet(self)
+        self._outlet = CommandOutlet(self, self._session, self._settings.controller)
         self._reference = self.create_publisher(
             JointState, interfaces.REFERENCE, interfaces.RELIABLE
         )
@@ -110,6 +110,14 @@ class PlannerNode(GuardedNode):
         self.create_subscription(
             JointState, interfaces.JOINT_STATES, self._on_measured, interfaces.SENSOR_DATA
         )
+
+    def _offer_action(self, rest: RestServices) -> TrajectoryServer | None:
+        """Return the server of the action; None without control_msgs, which is said."""
+        try:
+            return TrajectoryServer(self, self._session, self._goals, rest.stop)
+        except UnknownType as error:
+            self._log.info(str(error))
+            return None
 
     def rest(self) -> None:
         """Stream zeros until the next motion; a command that was sent ends at rest by itself."""
@@ -171,36 +179,18 @@ class PlannerNode(GuardedNode):
         response.message = status.message
         return response
 
-    def _bring_to_rest(
-        self,
-        act: Callable[[float, Callable[[], float]], Motion | None],
-        nothing: str,
-        _: Trigger.Request,
-        response: Trigger.Response,
-    ) -> Trigger.Response:
-        """Send the motion that an act of the session returns, if there is one."""
-        self._goals.answer_all()
-        try:
-            motion = act(self._now(), self._now)
-        except FlatPlannerError as error:
-            response.success = False
-            response.message = f'not brought to rest: {error}'
-            return response
-        response.success, response.message = True, nothing
-        if motion is None:
-            return response
+    def _carry_out(self, message: str) -> None:
+        """Send a motion to rest."""
         self._publish_motion()
-        response.message = (
-            f'plan {motion.plan_id} comes to rest {motion.end - self._now():.3f} s from now'
-        )
-        self._log.info(response.message)
+        self._log.info(message)
         self._report_ended()
-        return response
 
     def _on_tick(self) -> None:
         """Publish what is planned for now, and the end of a motion."""
         self._report_ended()
         now = self._now()
+        if self._actions is not None:
+            self._actions.tick(now)
         samples = self._session.reference(now)
         if samples is not None:
             self._reference.publish(conversions.reference_msg(samples, self._joints, now))
@@ -215,10 +205,13 @@ class PlannerNode(GuardedNode):
             self._publish_status(diagnostics.astray_status(astray))
         for ended in self._session.take_ended(self._now()):
             remark = '' if ended.shortfall is None else self._outlet.doubt(self._settings)
-            self._publish_status(diagnostics.ended_status(ended, remark))
+            status = diagnostics.ended_status(ended, remark)
+            self._publish_status(status)
+            if self._actions is not None:
+                self._actions.ended(ended, status)
 
-    def _answer(self, read: Callable[[], Goal]) -> DiagnosticStatus:
-        """Give a goal exactly one verdict; carry it out if it is accepted."""
+    def _answer(self, read: Read, tell: Tell = tell_nobody) -> DiagnosticStatus:
+        """Give a goal exactly one verdict, and tell it; carry the goal out if it is accepted."""
         goal = motion = None
         started = perf_counter()
         try:
@@ -242,6 +235,7 @@ class PlannerNode(GuardedNode):
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
             status = self._internal_error(error, goal, motion)
         self._publish_status(status)
+        tell(status)
         self._report_ended()
         return status
 

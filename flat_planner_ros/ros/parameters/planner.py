@@ -58,6 +58,13 @@ class CommandStamp(Enum):
     ZERO = 'zero'
 
 
+class CommandInterface(Enum):
+    """How a command reaches its executor."""
+
+    TOPIC = 'topic'
+    ACTION = 'action'
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlannerSettings:
     """
@@ -71,6 +78,8 @@ class PlannerSettings:
         How they are read.
     command
         Form of the command.
+    controller
+        Name of the action whose goals commands are; empty where they go by their topic.
     reference_rate
         Rate of `~/reference` [Hz].
     auto_tune
@@ -87,6 +96,7 @@ class PlannerSettings:
     session: SessionSettings
     joint_states: JointStateRules
     command: CommandForm
+    controller: str
     reference_rate: float
     auto_tune: bool
     report_advice: bool
@@ -287,6 +297,21 @@ ROWS = [
         'stamp of the command: its absolute start, or zero = on arrival',
     ),
     Row(
+        'command.interface',
+        CommandInterface.TOPIC,
+        '',
+        'how a command is sent: on ~/joint_trajectory, or as a goal of command.action',
+        'action needs control_msgs',
+        read_only=True,
+    ),
+    Row(
+        'command.action',
+        'flat_arm_controller/follow_joint_trajectory',
+        '',
+        "the controller's action, with command.interface action",
+        read_only=True,
+    ),
+    Row(
         'reference_rate',
         100.0,
         'Hz',
@@ -355,6 +380,7 @@ def build(values: Values) -> PlannerSettings:
     )
     # What admits no motion is refused here and not at the next goal.
     check_options(arm, options)
+    by_topic = CommandInterface(values['command.interface']) is CommandInterface.TOPIC
     session = SessionSettings(
         joints=joints,
         arm=arm,
@@ -384,11 +410,13 @@ def build(values: Values) -> PlannerSettings:
         finish_patience=values['finish.patience'],
         is_stamped=CommandStamp(values['command.stamp']) is CommandStamp.ABSOLUTE,
         execute=values['execute'],
+        awaits_answer=not by_topic,
     )
     return PlannerSettings(
         session=session,
         joint_states=joint_state_rules(values),
         command=_command_form(values),
+        controller='' if by_topic else values['command.action'],
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
         report_advice=values['report_advice'],

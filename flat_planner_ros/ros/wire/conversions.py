@@ -103,6 +103,11 @@ def goal_from_trajectory(data: bytes) -> Goal:
     """
     msg = _goal_message(data, JointTrajectory)
     check_point_count(len(msg.points))
+    return goal_of_trajectory(msg)
+
+
+def goal_of_trajectory(msg: JointTrajectory) -> Goal:
+    """Return the goal that a trajectory states, unchecked."""
     points = tuple(
         GoalPoint(
             time=stamps.seconds(point.time_from_start),

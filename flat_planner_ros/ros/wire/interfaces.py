@@ -43,6 +43,7 @@ REFERENCE = '~/reference'
 STATUS = '~/status'
 REPLAN = '~/replan'
 STOP = '~/stop'
+FOLLOW = '~/follow_joint_trajectory'
 SETTLE = '~/settle'
 ADOPT = '~/adopt_estimate'
 SAVE = '~/save_model'
@@ -109,6 +110,7 @@ ERROR_CODES = {
     Reason.START_STATE_MISMATCH: -122,
     Reason.NOT_AT_REST: -123,
     Reason.CLOCK_JUMPED: -124,
+    Reason.CONTROLLER_FAILED: -125,
     Reason.SOLVER_FAILED: -130,
     Reason.ILL_CONDITIONED: -131,
     Reason.BUSY: -140,
