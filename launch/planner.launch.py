@@ -81,6 +81,12 @@ def generate_launch_description() -> LaunchDescription:
                 description="input of the arm's controller",
             ),
             DeclareLaunchArgument(
+                'command_action',
+                default_value='',
+                description="action of the arm's controller, which then has commands as goals "
+                'instead; needs control_msgs',
+            ),
+            DeclareLaunchArgument(
                 'tracker',
                 default_value='false',
                 choices=BOOLEAN,
@@ -149,6 +155,9 @@ def _nodes(context: LaunchContext) -> list[Node]:
     strategy = LaunchConfiguration('strategy').perform(context)
     if strategy:
         planner.append({'strategy': strategy})
+    action = LaunchConfiguration('command_action').perform(context)
+    if action:
+        planner.append({'command.interface': 'action', 'command.action': action})
     return [
         Node(
             executable='planner_node',

@@ -59,13 +59,15 @@ MESSAGES_ALLOWED = {
     'model_adoption.py': 'hears reports and answers a service for the planner node',
     'row.py': 'descriptors of parameters, from rcl_interfaces',
     'node_parameters.py': 'verdicts on changed parameters, from rcl_interfaces',
+    'rest_services.py': 'answers two services for the planner node',
+    'follow_joint_trajectory.py': 'the same as conversions.py for an action',
     'guarded_callbacks.py': 'answers requests that rclpy cannot read, from rcl_interfaces',
     'stamps.py': 'stamps to seconds and back',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
 }
 """Patterns of the files that import message packages, each with its reason."""
 
-WITH_RCLPY = {'builtin_interfaces', 'rcl_interfaces'}
+WITH_RCLPY = {'action_msgs', 'builtin_interfaces', 'rcl_interfaces'}
 """Message packages that the wheel of rclpy brings along."""
 
 

@@ -60,6 +60,7 @@ ROSDEP_KEYS = {
 """Keys of rosdistro's rosdep/python.yaml that have a package on Ubuntu 24.04."""
 
 ROS_PACKAGES = {
+    'action_msgs',
     'ament_copyright',
     'ament_flake8',
     'ament_index_python',

@@ -69,6 +69,11 @@ class CommandOutlet:
         self._plan.publish(plan)
         self._flat_plan.publish(conversions.flat_plan_bytes(track))
 
+    def close(self) -> None:
+        """Leave a controller alone with what it was sent."""
+        if self._controller is not None:
+            self._controller.close()
+
     def doubt(self, settings: PlannerSettings) -> str:
         """Return that nobody hears the commands, a clause; empty if somebody does or need not."""
         if not settings.session.execute:

@@ -17,7 +17,6 @@
 from functools import partial
 from typing import Any
 
-from action_msgs.msg import GoalStatus
 from flat_planner_ros.core.planning import Reason
 from flat_planner_ros.core.session import PlannerSession, Shortfall
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
@@ -79,7 +78,7 @@ class ControllerClient:
         self._when_done(future, self._on_response)
 
     def close(self) -> None:
-        """Listen to no more answers."""
+        """Listen to no more answers: the client does not end with its node."""
         self._count += 1
         self._client.destroy()
 
@@ -103,7 +102,7 @@ class ControllerClient:
 
     def _on_result(self, answer: Any) -> None:
         """Tell the session how the controller has ended."""
-        if answer.status == GoalStatus.STATUS_SUCCEEDED:
+        if action.has_succeeded(answer):
             self._session.answered(action.words_of(answer))
         else:
             self._session.give_up(action.shortfall_of(answer, self._name))

@@ -15,9 +15,8 @@
 """Queue of goals: those that come before the first joint state wait for it, bounded."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.core.session import Goal, PlannerSession
 from flat_planner_ros.ros.wire import interfaces, stamps
@@ -30,11 +29,11 @@ LOOK_PERIOD = 0.05
 Read = Callable[[], Goal]
 """What reads a goal; may refuse it."""
 
-Tell = Callable[[DiagnosticStatus], object]
-"""What else is to be told the verdict on a goal."""
+Tell = Callable[[Mapping[str, str], str], object]
+"""What else is to be told the verdict on a goal: its values, and its sentence."""
 
 
-def tell_nobody(_: DiagnosticStatus) -> None:
+def tell_nobody(_: Mapping[str, str], __: str) -> None:
     """Leave a verdict to those who listen to the status."""
 
 

@@ -41,7 +41,7 @@ from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.message_types import UnknownType
-from flat_planner_ros.ros.wire.verdict_text import log_line
+from flat_planner_ros.ros.wire.verdict_text import log_line, values_of
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
@@ -124,8 +124,11 @@ class PlannerNode(GuardedNode):
         self._efforts.rest()
 
     def destroy_node(self) -> None:
-        """End the stream of efforts with zeros, then the node."""
+        """End the stream of efforts with zeros, and the actions, then the node."""
         self._efforts.end()
+        self._outlet.close()
+        if self._actions is not None:
+            self._actions.close()
         super().destroy_node()
 
     @property
@@ -208,7 +211,7 @@ class PlannerNode(GuardedNode):
             status = diagnostics.ended_status(ended, remark)
             self._publish_status(status)
             if self._actions is not None:
-                self._actions.ended(ended, status)
+                self._actions.ended(ended, values_of(status), status.message)
 
     def _answer(self, read: Read, tell: Tell = tell_nobody) -> DiagnosticStatus:
         """Give a goal exactly one verdict, and tell it; carry the goal out if it is accepted."""
@@ -235,7 +238,7 @@ class PlannerNode(GuardedNode):
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
             status = self._internal_error(error, goal, motion)
         self._publish_status(status)
-        tell(status)
+        tell(values_of(status), status.message)
         self._report_ended()
         return status
 
@@ -268,8 +271,7 @@ class PlannerNode(GuardedNode):
             DiagnosticStatus.WARN: self._log.warning,
             DiagnosticStatus.ERROR: self._log.error,
         }
-        values = {pair.key: pair.value for pair in status.values}
-        say[status.level](log_line(status.message, values))
+        say[status.level](log_line(status.message, values_of(status)))
 
 
 def main(args: Sequence[str] | None = None) -> int:

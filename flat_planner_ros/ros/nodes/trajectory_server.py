@@ -14,12 +14,11 @@
 
 """The planner as a server of FollowJointTrajectory, for motion planners and other clients."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from flat_planner_ros.core.session import Ended, Outcome, PlannerSession
 from flat_planner_ros.ros.nodes.goal_queue import GoalQueue
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
@@ -58,6 +57,12 @@ class _OpenGoal:
     outcome: Outcome = Outcome.FAILED
     code: int = 0
     words: str = ''
+
+    def end(self, outcome: Outcome, values: Mapping[str, str], words: str) -> None:
+        """Note how it has ended, with the values and the sentence of a status."""
+        self.outcome = outcome
+        self.code = int(values['error_code'])
+        self.words = words
 
 
 class TrajectoryServer:
@@ -109,11 +114,15 @@ class TrajectoryServer:
             cancel_callback=node.guarded(self._on_cancel, f'a cancellation of {name}'),
         )
 
-    def ended(self, ended: Ended, status: DiagnosticStatus) -> None:
+    def ended(self, ended: Ended, values: Mapping[str, str], words: str) -> None:
         """Take how a motion has ended, and what is said of it."""
         for goal in self._open:
             if goal.plan_id == ended.motion.plan_id and not goal.words:
-                _end(goal, ended.outcome, status)
+                goal.end(ended.outcome, values, words)
+
+    def close(self) -> None:
+        """End the action: it does not end with its node."""
+        self._server.destroy()
 
     def tick(self, now: float) -> None:
         """Send results, and feedback at its rate; the present time [s]."""
@@ -132,11 +141,10 @@ class TrajectoryServer:
             partial(action.planner_goal, handle.request), partial(self._on_verdict, goal)
         )
 
-    def _on_verdict(self, goal: _OpenGoal, status: DiagnosticStatus) -> None:
+    def _on_verdict(self, goal: _OpenGoal, values: Mapping[str, str], words: str) -> None:
         """Take the planner's verdict on a goal."""
-        values = {pair.key: pair.value for pair in status.values}
         if values['state'] == 'REJECTED':
-            _end(goal, Outcome.FAILED, status)
+            goal.end(Outcome.FAILED, values, words)
         elif not self._session.settings.execute:
             goal.words, goal.code = PLANNED_ONLY, NOT_FINISHED
         else:
@@ -171,10 +179,3 @@ class TrajectoryServer:
                 joints = self._session.settings.joints
                 said = action.feedback(joints, motion, self._session.measured, now)
                 goal.handle.publish_feedback(said)
-
-
-def _end(goal: _OpenGoal, outcome: Outcome, status: DiagnosticStatus) -> None:
-    """Note how a goal has ended, in the words and with the code of a status."""
-    values = {pair.key: pair.value for pair in status.values}
-    goal.outcome, goal.code = outcome, int(values['error_code'])
-    goal.words = status.message

@@ -14,7 +14,6 @@
 
 """FollowJointTrajectory of control_msgs, which need not be installed: goals, answers, feedback."""
 
-from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
@@ -91,9 +90,9 @@ def result(code: int, words: str) -> Any:
     return action_type().Result(error_code=code, error_string=words)
 
 
-def result_of(values: Mapping[str, str], words: str) -> Any:
-    """Return the result of a goal whose end is said by the values of a status."""
-    return result(int(values['error_code']), words)
+def has_succeeded(answer: Any) -> bool:
+    """Tell whether a controller says that it has carried out a goal."""
+    return bool(answer.status == GoalStatus.STATUS_SUCCEEDED)
 
 
 def words_of(answer: Any) -> str:

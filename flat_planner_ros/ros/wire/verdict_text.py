@@ -15,6 +15,7 @@
 """What verdicts say to people besides their numbers."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from flat_planner_ros.core.session import Motion
 import numpy as np
@@ -60,6 +61,11 @@ def clauses(motion: Motion) -> str:
     if motion.duration_factor > 1.0:
         told.insert(0, f'up to {motion.duration_factor:g} times the shortest (duration.factor)')
     return ''.join(f'; {clause}' for clause in told)
+
+
+def values_of(status: Any) -> dict[str, str]:
+    """Return the values of a status by their keys."""
+    return {pair.key: pair.value for pair in status.values}
 
 
 def log_line(message: str, values: Mapping[str, str]) -> str:

@@ -14,26 +14,9 @@
 
 """Clocks that are set back or changed while a motion is under way."""
 
-from flat_planner_ros.ros.wire import stamps
 import pytest
 from ros.rig import Planner
-from rosgraph_msgs.msg import Clock
-
-LENIENT = {'start.joint_state_timeout': 1e6}
-
-
-class Timed(Planner):
-    """A planner whose time a test makes."""
-
-    def __init__(self, graph, **parameters):
-        """Start it."""
-        super().__init__(graph, {'use_sim_time': True, **LENIENT, **parameters})
-
-    def be(self, time):
-        """Set the time [s] and wait until the planner has it."""
-        clock = Clock(clock=stamps.time_msg(time))
-        self.graph.publish('/clock', clock)
-        self.graph.expect(lambda: self.now() == pytest.approx(time), 'the time')
+from ros.timed_planner import LENIENT, Timed
 
 
 def test_a_clock_set_back_in_a_motion_fails_it_and_the_next_goal_starts_anew(graph):
@@ -48,7 +31,9 @@ def test_a_clock_set_back_in_a_motion_fails_it_and_the_next_goal_starts_anew(gra
     assert failed['error_name'] == 'CLOCK_JUMPED'
     assert failed['error_code'] == '-124'
     assert float(failed['value']) == pytest.approx(-107.0)
-    assert len(graph.logged('the clock was set back by 107.000 s')) == 1
+    line = 'the clock was set back by 107.000 s'
+    graph.expect(lambda: graph.logged(line), 'the line')
+    assert len(graph.logged(line)) == 1
     rig.measure((0.3, 0.0))
     verdict = rig.send(1.0, 2.0)
     assert verdict['state'] == 'ACCEPTED'
