@@ -15,10 +15,9 @@
 """Parameters of the planner node."""
 
 from dataclasses import dataclass
-from enum import Enum
 from math import isqrt
 
-from flat_planner_ros.core.arm import Drive, FlatModel, InvalidCommand, JointStateRules
+from flat_planner_ros.core.arm import Drive, FlatModel, JointStateRules
 from flat_planner_ros.core.motion_law import QuadraticCost, Strategy
 from flat_planner_ros.core.planning import (
     check_options,
@@ -37,6 +36,12 @@ from flat_planner_ros.core.session import (
     WhenMoving,
 )
 from flat_planner_ros.ros.parameters.arm_model import arm_of, imbalanced_arm, MODEL_ROWS
+from flat_planner_ros.ros.parameters.command import (
+    command_form,
+    COMMAND_ROWS,
+    controller_of,
+    is_stamped,
+)
 from flat_planner_ros.ros.parameters.insensitivity import insensitivity_of, INSENSITIVITY_ROWS
 from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
 from flat_planner_ros.ros.parameters.limits import LIMIT_ROWS, limits_of
@@ -49,20 +54,6 @@ from flat_planner_ros.ros.parameters.row import (
 )
 from flat_planner_ros.ros.wire.command_form import CommandForm
 import numpy as np
-
-
-class CommandStamp(Enum):
-    """Meaning of a command's stamp."""
-
-    ABSOLUTE = 'absolute'
-    ZERO = 'zero'
-
-
-class CommandInterface(Enum):
-    """How a command reaches its executor."""
-
-    TOPIC = 'topic'
-    ACTION = 'action'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -277,40 +268,7 @@ ROWS = [
     Row(
         'execute', SessionSettings.execute, '', 'publish commands', 'false = plan and report only'
     ),
-    Row('command.include_passive_joint', True, '', 'name the passive joint in the command'),
-    Row('command.include_effort', True, '', 'put the feed-forward effort into the command'),
-    Row('command.include_acceleration', True, '', 'put accelerations into the command'),
-    Row(
-        'command.tolerance',
-        0.0,
-        'rad',
-        'leave out the points that cubic interpolation of positions and velocities does not need '
-        'for this; 0 = none',
-        'without efforts only, which are joined by straight lines',
-        lower=0.0,
-        upper=0.001,
-    ),
-    Row(
-        'command.stamp',
-        CommandStamp.ABSOLUTE,
-        '',
-        'stamp of the command: its absolute start, or zero = on arrival',
-    ),
-    Row(
-        'command.interface',
-        CommandInterface.TOPIC,
-        '',
-        'how a command is sent: on ~/joint_trajectory, or as a goal of command.action',
-        'action needs control_msgs',
-        read_only=True,
-    ),
-    Row(
-        'command.action',
-        'flat_arm_controller/follow_joint_trajectory',
-        '',
-        "the controller's action, with command.interface action",
-        read_only=True,
-    ),
+    *COMMAND_ROWS,
     Row(
         'reference_rate',
         100.0,
@@ -380,7 +338,7 @@ def build(values: Values) -> PlannerSettings:
     )
     # What admits no motion is refused here and not at the next goal.
     check_options(arm, options)
-    by_topic = CommandInterface(values['command.interface']) is CommandInterface.TOPIC
+    controller = controller_of(values)
     session = SessionSettings(
         joints=joints,
         arm=arm,
@@ -408,15 +366,15 @@ def build(values: Values) -> PlannerSettings:
         replan_tolerance=values['replan.tolerance'],
         finish_tolerance=values['finish.position_tolerance'],
         finish_patience=values['finish.patience'],
-        is_stamped=CommandStamp(values['command.stamp']) is CommandStamp.ABSOLUTE,
+        is_stamped=is_stamped(values),
         execute=values['execute'],
-        awaits_answer=not by_topic,
+        awaits_answer=bool(controller),
     )
     return PlannerSettings(
         session=session,
         joint_states=joint_state_rules(values),
-        command=_command_form(values),
-        controller='' if by_topic else values['command.action'],
+        command=command_form(values),
+        controller=controller,
         reference_rate=values['reference_rate'],
         auto_tune=values['auto_tune'],
         report_advice=values['report_advice'],
@@ -424,23 +382,6 @@ def build(values: Values) -> PlannerSettings:
         stream_effort=values['stream_effort'],
         save_path=values['save_model.path'],
     )
-
-
-def _command_form(values: Values) -> CommandForm:
-    """Return what commands contain."""
-    form = CommandForm(
-        include_passive_joint=values['command.include_passive_joint'],
-        include_acceleration=values['command.include_acceleration'],
-        include_effort=values['command.include_effort'],
-        absolute_stamp=CommandStamp(values['command.stamp']) is CommandStamp.ABSOLUTE,
-        tolerance=values['command.tolerance'],
-    )
-    if form.tolerance and form.include_effort:
-        raise InvalidCommand(
-            f'command.tolerance = {form.tolerance:g} rad needs command.include_effort: false; '
-            'efforts are joined by straight lines and would not be those planned'
-        )
-    return form
 
 
 def _custom_cost(values: Values) -> np.ndarray | None:
