@@ -23,9 +23,10 @@ values reported are those of the law itself at the times found (docs/derivation.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import ceil, log2
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law import CONDITIONS
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
 from flat_planner_ros.core.planning.reference_trajectory import ReferenceTrajectory
@@ -53,6 +54,12 @@ resolving all five, however roughly, leaves no layer unseen between two nodes.
 
 NOISE = 1e-12
 """Changes below this share of a quantity's peak over all joints are taken for rounding [-]."""
+
+FIRST_LAYER = 0.125
+"""Part of a smooth piece that its first and last segment take, without boundary layers [-]."""
+
+SEEN_RATE = 17.0
+"""Rate of a boundary layer that such a segment resolves, in 2 / length of the piece [-]."""
 
 MAX_ROUNDS = 40
 """Halvings of a segment; what is left then is a jump, whose two sides are both nodes."""
@@ -170,7 +177,7 @@ def extrema_of(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> 
 
 def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     """Return series of all joints' quantities, in the order of quantities and joints."""
-    bounds, orders = _first_bounds(plan.trajectory)
+    bounds, orders = _first_bounds(plan.trajectory, plan.problem.unit.law.rates)
     starts, lengths = bounds[:-1], np.diff(bounds)
     scale, layer_scale = _Range(), _Range()
     done: list[tuple[FloatArray, FloatArray, FloatArray, BoolArray]] = []
@@ -201,14 +208,23 @@ def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     return _Mesh(starts=starts, lengths=lengths, values=values, resolved=resolved)
 
 
-def _first_bounds(trajectory: ReferenceTrajectory) -> tuple[FloatArray, int]:
-    """Return times between which laws are smooth, and the number of continuous derivatives."""
+def _first_bounds(trajectory: ReferenceTrajectory, rates: ComplexArray) -> tuple[FloatArray, int]:
+    """
+    Return times between which laws are smooth, and the number of continuous derivatives.
+
+    Boundary layers are cut as finely as the rates, in 2 / duration, will ask for.
+    """
     if trajectory.knots is not None:
         # The fifth derivative jumps where an effort has a corner.
         return trajectory.knots, CONDITIONS - 1
     edges = np.array(trajectory.edges)
-    fractions = np.array([0.0, 0.125, 0.5, 0.875])
-    inner = edges[:-1, None] + np.diff(edges)[:, None] * fractions
+    lengths = np.diff(edges)
+    share = lengths.max() / (edges[-1] - edges[0])
+    rate = share * np.abs(rates.real).max(initial=SEEN_RATE)
+    depth = ceil(log2(max(rate / SEEN_RATE, 1.0)))
+    layers = FIRST_LAYER * 0.5 ** np.arange(depth, -1.0, -1.0)
+    fractions = np.concatenate([[0.0], layers, [0.5], 1.0 - layers[::-1]])
+    inner = edges[:-1, None] + lengths[:, None] * fractions
     return np.append(inner.ravel(), edges[-1]), CONDITIONS
 
 

@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, locked
@@ -159,7 +160,7 @@ class JointLimits:
             position_max=np.where(near_high, np.maximum(positions, high), high),
         )
 
-    @property
+    @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Return what is limited at all."""
         finite = {

@@ -23,7 +23,7 @@ until one that obeys is found next to one that does not, and then looks for othe
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import inf, isfinite, log, sqrt
+from math import exp, inf, isfinite, log, sqrt
 
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.planning.certified_plan import Plan
@@ -48,6 +48,15 @@ FIRST_STRIDE = 1.1
 
 DIGITS = 9
 """Significant digits of the durations tried: as many as are reported."""
+
+PATIENCE = 2
+"""Secants in a row that do not halve a gap, after which a bisection does [-]."""
+
+ALIKE = 1.02
+"""Ratio of two uses of a limit, both beyond it, between which others are taken to be [-]."""
+
+HOPELESS = 100.0
+"""Use of a limit of velocity or effort beyond which no shorter duration is tried [-]."""
 
 SAMPLES = 33
 """Times at which a duration of a scan is looked at: most are ruled out by that."""
@@ -106,7 +115,7 @@ class _Trial:
     estimate
         Duration at which all limits would just be obeyed if peaks were powers of it [s].
     is_sampled
-        Whether the use is that at some times only, and there beyond a limit already.
+        Whether the use is that at some times only, at most the true one.
 
     """
 
@@ -120,7 +129,14 @@ class _Trial:
     @property
     def obeys(self) -> bool:
         """Tell whether the motion obeys all limits."""
-        return self.ratio <= 1.0
+        return self.ratio <= 1.0 and not self.is_sampled
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Tell whether nothing faster will obey: from rest it moves as far in less time."""
+        if self.plan is None or self.worst is None or self.worst.quantity is Quantity.POSITION:
+            return False
+        return self.plan.request.start_jets is None and self.ratio > HOPELESS
 
 
 def shortest_plan(
@@ -160,7 +176,8 @@ def shortest_plan(
     InvalidRequest
         The range is empty or not finite.
     NoFeasibleDuration
-        No duration on a grid of ratio `SCAN_STEP` over the whole range obeys the limits.
+        No duration on a grid of ratio `SCAN_STEP` over the whole range obeys the limits; some are
+        not tried, whose neighbours rule them out.
     FlatPlannerError
         As `plan_of` raises it, if there is no plan of any duration on that grid.
 
@@ -213,26 +230,37 @@ class _Search:
         """Return the shortest trial that obeys."""
         return min((t for t in self.trials.values() if t.obeys), key=lambda t: t.duration)
 
-    def _try(self, duration: float, *, briefly: bool = False) -> _Trial:
+    def _try(self, duration: float) -> _Trial:
+        """Return the trial of a duration."""
+        return self._looked_at(duration)
+
+    def _try_briefly(self, duration: float) -> _Trial:
+        """Return the trial of a duration, by samples if they rule it out."""
+        trial = self._glance(duration)
+        return self._try(duration) if trial.is_sampled and trial.ratio <= 1.0 else trial
+
+    def _glance(self, duration: float) -> _Trial:
+        """Return the trial of a duration by samples, unless more is known."""
+        return self._looked_at(duration, is_sampled=True)
+
+    def _looked_at(self, duration: float, *, is_sampled: bool = False) -> _Trial:
         """Return the trial of a duration, rounded so that its usual text is exactly it."""
         rounded = float(f'{duration:.{DIGITS}g}')
         duration = min(max(rounded, self.shortest), self.longest)
         known = self.trials.get(duration)
-        if known is not None and (briefly or not known.is_sampled):
+        if known is not None and (is_sampled or not known.is_sampled):
             return known
         try:
-            plan = self.plan_of(duration)
+            plan = self.plan_of(duration) if known is None or known.plan is None else known.plan
         except (UncertifiedPlan, OutOfReach) as error:
             self.failure = error
             trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
             self._refuse_ends(plan)
-            uses = []
-            if briefly:
+            if is_sampled:
                 times = plan.duration * np.linspace(0.0, 1.0, SAMPLES)
                 uses = self.limits.uses_at(plan, times)
-            is_sampled = any(use.is_exceeded for use in uses)
-            if not is_sampled:
+            else:
                 uses = self.limits.uses(plan)
             worst = max(uses, key=lambda use: use.ratio, default=None)
             stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
@@ -248,26 +276,31 @@ class _Search:
         return trial
 
     def _bracket(self) -> bool:
-        """Look for one duration that obeys above one that does not; tell if any obeys."""
+        """
+        Look for one duration that obeys above one that does not; tell if any obeys.
+
+        By samples, as long as they seem to obey; the shortest that really does is the last.
+        """
         stride = FIRST_STRIDE
         first = self.shortest if self.is_bound else sqrt(self.shortest * self.longest)
-        trial = self._try(first)
-        descends = trial.obeys
-        while trial.obeys == descends:
+        trial = self._glance(first)
+        descends = trial.ratio <= 1.0
+        while (trial.ratio <= 1.0) == descends:
             here = trial.duration
             if descends:
-                beyond = max(self.shortest, min(trial.estimate / AIM, here / FIRST_STRIDE))
+                beyond = max(self.shortest, min(trial.estimate / AIM, here / stride))
             else:
                 beyond = min(self.longest, max(trial.estimate * AIM, here * stride))
-                stride *= stride
+            stride *= stride
             if beyond == here or self._is_content:
                 break
-            trial = self._try(beyond)
-        return descends or trial.obeys
+            trial = self._glance(beyond)
+        seeming = sorted(t.duration for t in self.trials.values() if t.ratio <= 1.0)
+        return any(self._try(duration).obeys for duration in seeming)
 
     def _refine(self) -> None:
         """Close the gap between the shortest trial that obeys and the next below."""
-        stuck = False
+        slow = 0
         while True:
             good = self._lowest
             below = [t for t in self.trials.values() if t.duration < good.duration]
@@ -283,25 +316,46 @@ class _Search:
             if width <= 1.0 + DURATION_TOLERANCE:
                 return
             middle = sqrt(bad.duration * good.duration)
-            if not stuck and isfinite(bad.ratio) and good.ratio > 0.0:
-                # Secant in logarithms, where powers are straight lines. It aims a little beyond
-                # the root: one trial on either side of it, that near, closes the gap.
-                share = log(bad.ratio) / log(bad.ratio / good.ratio)
-                middle = bad.duration * width**share * (1.0 + 0.25 * DURATION_TOLERANCE)
+            if slow < PATIENCE and isfinite(bad.ratio) and good.ratio > 0.0:
+                # It aims a little beyond the root: one trial on either side of it, that near,
+                # closes the gap.
+                middle = self._secant(bad, good) * (1.0 + 0.25 * DURATION_TOLERANCE)
             margin = 1.0 + 0.5 * DURATION_TOLERANCE
             middle = min(max(middle, bad.duration * margin), good.duration / margin)
             left = good.duration / middle
             if self._try(middle).obeys:
                 left = middle / bad.duration
-            stuck = not stuck and log(left) > 0.5 * log(width)
+            slow = slow % (PATIENCE + 1) + 1 if log(left) > 0.5 * log(width) else 0
+
+    def _secant(self, bad: _Trial, good: _Trial) -> float:
+        """Return where the limit is just reached, by a secant in logarithms: powers are lines."""
+        known = [t for t in self.trials.values() if 0.0 < t.ratio < inf]
+        known.sort(key=lambda trial: abs(log(trial.ratio)))
+        low, high = log(bad.duration), log(good.duration)
+        # Through the two trials nearest to the limit, though they may be on one side of it.
+        root = _root(known[0], known[1])
+        return exp(root if low < root < high else _root(bad, good))
 
     def _scan(self, low: float, high: float) -> None:
         """Try a grid of durations between two."""
         duration = high / SCAN_STEP
         while duration > low and not self._is_content:
-            self._try(duration, briefly=True)
+            if not self._is_ruled_out(duration) and self._try_briefly(duration).is_hopeless:
+                return
             duration /= SCAN_STEP
-        self._try(low, briefly=True)
+        self._try_briefly(low)
+
+    def _is_ruled_out(self, duration: float) -> bool:
+        """Tell whether a limit is exceeded by nearly the same on both sides: a static load."""
+        trials = self.trials.values()
+        below = max((t for t in trials if t.duration < duration), key=_duration, default=None)
+        above = min((t for t in trials if t.duration > duration), key=_duration, default=None)
+        if below is None or above is None or below.worst is None or above.worst is None:
+            return False
+        ratios = below.ratio, above.ratio
+        place = below.worst.quantity, below.worst.joint
+        is_alike = place == (above.worst.quantity, above.worst.joint)
+        return is_alike and min(ratios) > 1.0 and max(ratios) < ALIKE * min(ratios)
 
     def _refuse_ends(self, plan: Plan) -> None:
         """Refuse a motion that starts or ends with too large an effort; looked at once."""
@@ -313,11 +367,26 @@ class _Search:
 
     def _refuse_if_none(self) -> None:
         """Refuse if no trial obeys."""
-        while (least := min(self.trials.values(), key=lambda trial: trial.ratio)).is_sampled:
-            self._try(least.duration)
-        if least.obeys:
+        least = min(self.trials.values(), key=lambda trial: trial.ratio)
+        if least.is_sampled:
+            least = self._try(least.duration)
+        if any(trial.obeys for trial in self.trials.values()):
             return
         if least.worst is not None:
             raise NoFeasibleDuration(least.worst, least.duration, self.shortest, self.longest)
         if self.failure is not None:
             raise self.failure
+
+
+def _duration(trial: _Trial) -> float:
+    """Return the duration of a trial [s]."""
+    return trial.duration
+
+
+def _root(first: _Trial, second: _Trial) -> float:
+    """Return the logarithm of the duration at which a line through two trials is at the limit."""
+    rise = log(second.ratio) - log(first.ratio)
+    if rise == 0.0:
+        return inf
+    start = log(first.duration)
+    return start - log(first.ratio) / rise * (log(second.duration) - start)
