@@ -17,8 +17,15 @@
 from dataclasses import dataclass
 from math import inf, pi
 
-from flat_planner_ros.core.arm import Drive, FloatArray, InvalidModel, PlanarArm
-from flat_planner_ros.core.plant.effort_profile import JointReference
+from flat_planner_ros.core.arm import (
+    checked_array,
+    Drive,
+    FloatArray,
+    InvalidCommand,
+    InvalidModel,
+    PlanarArm,
+)
+from flat_planner_ros.core.plant.effort_profile import check_bound, JointReference, MAX_EFFORT
 import numpy as np
 import numpy.typing as npt
 
@@ -97,7 +104,7 @@ class DriveSettings:
 
 class Drives:
     """
-    The motors of the actuated joints.
+    The motors of the actuated joints, and whoever pushes the arm besides.
 
     Where nothing is commanded they carry the weight of the arm, as the brakes or the gravity
     compensation of a real one do; that is nothing in a horizontal plane.
@@ -132,6 +139,7 @@ class Drives:
             self.servo = Servo(bandwidth=settings.servo_bandwidth, step=step)
         self.arm = arm
         """What they move; may be replaced."""
+        self._push, self._pushed_until = np.zeros(arm.n), -inf
         nothing, missing = np.zeros(motors), np.full(motors, np.nan)
         self.idle = JointReference(nothing, missing, missing, missing)
         """What stands for no command; its arrays are known by being these very ones."""
@@ -180,6 +188,38 @@ class Drives:
         if self.servo is not None:
             nothing = np.zeros(self.arm.n - 1)
             self.idle = JointReference(nothing, position[:-1].copy(), nothing, nothing)
+
+    def push(self, effort: npt.ArrayLike, until: float) -> None:
+        """
+        Let efforts from outside act on all joints.
+
+        Parameters
+        ----------
+        effort
+            Shape (n,) [N m].
+        until
+            Time from which they act no more [s].
+
+        Raises
+        ------
+        InvalidCommand
+            If they do not suit the arm.
+
+        """
+        shape = (self.arm.n,)
+        pushed = checked_array('push', effort, 'N m', shape=shape, error=InvalidCommand)
+        check_bound('push', pushed, MAX_EFFORT, 'N m')
+        self._push, self._pushed_until = pushed, until
+
+    def pushed(self, q: FloatArray, now: float) -> FloatArray | None:
+        """Return what a push adds to the accelerations (n,) [rad/s^2] now [s], if one acts."""
+        if now > self._pushed_until:
+            return None
+        mass = self.arm.mass_matrix(q)
+        if self.servo is not None:
+            # Servos hold their joints against any push; the last one gives way.
+            return np.append(np.zeros(self.arm.n - 1), self._push[-1] / mass[-1, -1])
+        return np.array(np.linalg.solve(mass, self._push), dtype=float)
 
     def _effort_for(self, acceleration: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         """Return the effort under which the actuated joints accelerate so, the last one free."""

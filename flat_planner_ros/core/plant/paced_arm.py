@@ -243,6 +243,10 @@ class PacedArm:
         self._simulated.hold(effort, self._simulated.time + self._settings.input_timeout)
         self._profile = None
 
+    def push(self, effort: npt.ArrayLike) -> None:
+        """Let efforts of all joints (n,) [N m] act besides, for input_timeout at most."""
+        self._simulated.push(effort, self._simulated.time + self._settings.input_timeout)
+
     def reset(self) -> None:
         """Rest at the initial position without a command; time goes on."""
         self._simulated.reset(self._settings.position)

@@ -42,7 +42,6 @@ GRID_TOLERANCE = 1e-6
 MAX_SPEED = 10 * MAX_VELOCITY
 """Joint velocity beyond which an arm is stopped: efforts, gains or steps make no sense [rad/s]."""
 
-
 UNLIMITED = DriveSettings()
 """Motors that give every effort that is commanded."""
 
@@ -243,6 +242,10 @@ class SimulatedArm:
         self._held = self._drives.idle._replace(effort=held)
         self._held_until = until
 
+    def push(self, effort: npt.ArrayLike, until: float) -> None:
+        """Let efforts (n,) [N m] act besides, until a time [s]; see `Drives.push`."""
+        self._drives.push(effort, until)
+
     def release(self) -> None:
         """Apply nothing until the next command; an arm with weight stands by its brakes."""
         self._profile = None
@@ -268,6 +271,7 @@ class SimulatedArm:
         self._position = checked_array('position', position, 'rad', shape=(self.arm.n,))
         self._velocity = np.zeros(self.arm.n)
         self._fault = ''
+        self.push(np.zeros(self.arm.n), -inf)
         self.release()
 
     def advance(self, until: float) -> int:
@@ -339,7 +343,8 @@ class SimulatedArm:
         asked = self._drives.asked(reference, q, dq)
         given = self._drives.limited(asked)
         self._is_clipped = self._is_clipped or given is not asked
-        return self.arm.forward_dynamics(q, dq, given)
+        pushed, moved = self._drives.pushed(q, self.time), self.arm.forward_dynamics(q, dq, given)
+        return moved if pushed is None else moved + pushed
 
     def _reference(self, t: float) -> JointReference:
         """Return what is commanded at an absolute time [s]."""

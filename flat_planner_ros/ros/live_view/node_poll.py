@@ -36,7 +36,7 @@ PATIENCE = 5.0
 
 NODES = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
 
-LINK_LENGTH, JOINTS = 'model.link_length', 'joints'
+LINK_LENGTH, STIFFNESS, JOINTS = 'model.link_length', 'model.stiffness', 'joints'
 
 
 class NodePoll:
@@ -80,9 +80,11 @@ class NodePoll:
     async def _ask_for_arm(self) -> None:
         """Tell what the picture of the arm and the plots need."""
         limits = {name: f'limits.{name}' for name in LIMITS}
-        known = await self._values(interfaces.PLANNER, (LINK_LENGTH, JOINTS, *limits.values()))
+        names = (LINK_LENGTH, STIFFNESS, JOINTS, *limits.values())
+        known = await self._values(interfaces.PLANNER, names)
         # None where the model is reduced: it has no lengths for the last two links.
         self._feed.put('links', known.get(LINK_LENGTH))
+        self._feed.put('stiffness', known.get(STIFFNESS))
         self._feed.put('limits', {key: known.get(name) for key, name in limits.items()})
         # A message may have named a part of the joints only.
         if known.get(JOINTS):

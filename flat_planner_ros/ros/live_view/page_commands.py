@@ -30,6 +30,7 @@ from flat_planner_ros.ros.wire import interfaces, stamps
 from flat_planner_ros.ros.wire.verdict_text import list_text
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -76,6 +77,11 @@ class PageCommands:
             interfaces.topic_of(interfaces.PLANNER, interfaces.GOAL),
             interfaces.RELIABLE,
         )
+        self._pushes = node.create_publisher(
+            Float64MultiArray,
+            interfaces.topic_of(interfaces.PLANT, interfaces.PUSH),
+            interfaces.RELIABLE,
+        )
         self._triggers = {
             name: node.create_client(Trigger, service) for name, service in SERVICES.items()
         }
@@ -99,6 +105,8 @@ class PageCommands:
             return await self._set(command.get('node'), command.get('values'))
         if deed == 'call':
             return await self._call(command.get('service'))
+        if deed == 'push':
+            return self._push(command.get('efforts'))
         raise InvalidRequest(f'unknown command {str(deed)[:TEXT_LIMIT]!r}')
 
     async def _send_goal(self, command: Mapping[str, Any]) -> tuple[bool, str]:
@@ -133,6 +141,15 @@ class PageCommands:
         if not result.successful:
             return False, result.reason
         return True, ', '.join(f'{name} = {value}' for name, value in values.items())
+
+    def _push(self, efforts: Any) -> tuple[bool, str]:
+        """Push the simulated arm for a moment."""
+        if not self._pushes.get_subscription_count():
+            raise InvalidRequest('no simulated arm is there to be pushed')
+        numbers = list_within(efforts, 'efforts', len(self.joints))
+        data = [number_within(effort, 'effort') for effort in numbers]
+        self._pushes.publish(Float64MultiArray(data=data))
+        return True, 'pushed'
 
     async def _call(self, service: Any) -> tuple[bool, str]:
         """Call a service."""

@@ -98,7 +98,9 @@ class PlantNode(GuardedNode):
         self._commands = name = interfaces.topic_of(sender, topic)
         # As bytes: the points of a long command would take a second to become Python objects.
         raw = callback == self._on_trajectory
-        self.create_subscription(kind, name, callback, interfaces.RELIABLE, raw=raw)
+        listen = self.create_subscription
+        listen(kind, name, callback, interfaces.RELIABLE, raw=raw)
+        listen(Float64MultiArray, interfaces.PUSH, self._on_push, interfaces.RELIABLE)
         clock = [interfaces.CLOCK] if self._settings.publish_clock else []
         GraphWatch(self, self._log, [name, *clock], [interfaces.JOINT_STATES])
 
@@ -133,6 +135,14 @@ class PlantNode(GuardedNode):
             self._arm.hold(msg.data)
         except FlatPlannerError as error:
             self._log.warning(f'effort ignored: {error}', WARNING_PERIOD)
+
+    def _on_push(self, msg: Float64MultiArray) -> None:
+        """Let somebody push the arm, for as long as an effort lasts."""
+        self._catch_up()
+        try:
+            self._arm.push(msg.data)
+        except FlatPlannerError as error:
+            self._log.warning(f'push ignored: {error}', WARNING_PERIOD)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Bring the arm back to rest where it started."""

@@ -158,6 +158,7 @@ class TrackerNode(GuardedNode):
         status = diagnostics.tracker_status(
             tracker.phase.value, tracker.error, self._fault, tracker.certificate
         )
+        status.hardware_id = self.get_fully_qualified_name()
         self._health.publish(diagnostics.array_of(status, self._now()))
 
     def _on_release(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -49,6 +49,7 @@ ADOPT = '~/adopt_estimate'
 SAVE = '~/save_model'
 
 RESET = '~/reset'
+PUSH = '~/push'
 RELEASE = '~/release'
 RESIDUAL = '~/residual'
 REPORT = '~/report'

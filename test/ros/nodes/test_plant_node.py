@@ -38,6 +38,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 COMMAND = '/flat_planner/joint_trajectory'
 EFFORTS = '/flat_planner/effort_commands'
 RESET = '/flat_plant/reset'
+PUSH = '/flat_plant/push'
 
 QUICK = {'publish_clock': True, 'real_time_factor': 5.0, 'publish_rate': 50.0}
 """Five simulated seconds per second, so few samples that the test's own node keeps up."""
@@ -494,6 +495,17 @@ def test_efforts_move_it_instead_of_trajectories(graph):
     assert plant.states[-1].velocity[0] > 0.0
     graph.publish(EFFORTS, Float64MultiArray(data=[0.0]))
     graph.expect(lambda: plant.states[-1].effort[0] == 0.0, 'no effort')
+
+
+def test_a_push_moves_it_besides_and_one_that_does_not_suit_is_ignored(graph):
+    plant = Plant(graph, QUICK)
+    for bad in ([], [1.0], [0.0, nan], [0.0, 1e300]):
+        graph.publish(PUSH, Float64MultiArray(data=bad))
+    plant.logged('push ignored: ')
+    assert not plant.table('velocity').any()
+    graph.publish(PUSH, Float64MultiArray(data=[0.0, 1e-4]))
+    graph.expect(lambda: plant.states[-1].velocity[1] != 0.0, 'a swing')
+    assert not plant.table('effort')[:, 0].any()
 
 
 def test_a_stream_of_efforts_moves_it_as_samples_that_are_held(graph):

@@ -13,7 +13,7 @@ function frameOf(width, height, links) {
 }
 
 // Return the lengths of all links.
-export function linksOf(joints, lengths) {
+function linksOf(joints, lengths) {
   return lengths?.length === joints ? lengths : [...Array(Math.max(0, joints - 2)).fill(1), ...REDUCED_LENGTHS];
 }
 
@@ -26,6 +26,14 @@ function pixelsOf(angles, links, frame) {
     y -= links[k] * frame.scale * Math.sin(theta);
     return [x, y];
   })];
+}
+
+// Return the pixels of all joints and of the tip in the picture, and its pixels per metre.
+export function armInPicture(canvas, joints, lengths, angles) {
+  const {width, height} = canvas.getBoundingClientRect();
+  const links = linksOf(joints, lengths);
+  const frame = frameOf(width, height, links);
+  return {...frame, links, pixels: pixelsOf(angles, links, frame)};
 }
 
 export function drawArm(canvas, {joints, lengths, measured, reference, goal, typed, way, trail, pull}) {

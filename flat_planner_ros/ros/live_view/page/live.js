@@ -7,6 +7,7 @@ import {picture, save, table} from './export.js';
 import {drawFigures, openFigures, plots} from './figures.js';
 import {handleGestures} from './gestures.js';
 import {GoalForm} from './goal.js';
+import {Pull} from './pull.js';
 import {Reports} from './reports.js';
 import {SettingsForm} from './settings.js';
 import {place, rowAt, Store} from './store.js';
@@ -26,6 +27,7 @@ const connection = new Connection({begin: () => store.forget(), hear: news => st
 const send = command => connection.send(command);
 const view = new TimeWindow(Number($('span').value));
 const goal = new GoalForm(store, send);
+const pull = new Pull($('arm'), store, send);
 new Reports(store);
 new TrackerCard(store, send);
 for (const form of document.querySelectorAll('.settings')) new SettingsForm(form, store, send);
@@ -100,7 +102,7 @@ function drawPose() {
   const {plan, links} = store.values;
   drawArm($('arm'), {
     joints: n, lengths: links, measured: poseOf(m), reference: poseOf(r), typed: goal.typed(),
-    goal: plan?.final ?? null, way: plan?.way ?? null,
+    goal: plan?.final ?? null, way: plan?.way ?? null, pull: pull.pointer,
     trail: trail.filter((_, k) => k % 3 === 0).map(poseOf),
   });
 }
