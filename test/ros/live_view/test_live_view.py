@@ -21,6 +21,7 @@ import signal
 import socket
 from time import monotonic
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
@@ -30,6 +31,7 @@ aiohttp = pytest.importorskip('aiohttp')
 from flat_planner_ros.ros import live_view as live  # noqa: E402, I100  They need it.
 from flat_planner_ros.ros.live_view import live_node  # noqa: E402
 from flat_planner_ros.ros.live_view.server import MAX_BROWSERS, RATE  # noqa: E402
+from flat_planner_ros.ros.wire import interfaces  # noqa: E402
 from ros.live_view.viewer import Browser, is_ready, PAGE, start_demo, View  # noqa: E402
 
 
@@ -117,6 +119,40 @@ def test_via_points_limits_and_parameters_without_a_value(graph):
         assert not reply['ok']
         after = browser.values['settings of flat_planner']
         assert (after['insensitivity.weight'], after['insensitivity.max_residual']) == (0.0, 0.0)
+
+    view.run(act)
+
+
+def test_the_simulated_arm_is_pushed_and_a_tracker_shown_while_it_speaks(graph):
+    start_demo(graph)
+    view = View(graph)
+    diagnostics = graph.probe.create_publisher(DiagnosticArray, interfaces.DIAGNOSTICS, 10)
+
+    def say(owner: str, phase: str) -> None:
+        status = DiagnosticStatus(name=interfaces.TRACKER_NAME, hardware_id=owner, level=b'\0')
+        status.values = [KeyValue(key='phase', value=phase)]
+        diagnostics.publish(DiagnosticArray(status=[status]))
+
+    async def act(browser: Browser) -> None:
+        await browser.expect(lambda: is_ready(browser), 'three nodes')
+        reply = await browser.ask(do='push', efforts=[0.0, 1e-4])
+        assert reply['ok'], reply
+        await browser.expect(lambda: browser.streams['measured'][-1][4] != 0.0, 'a swing')
+        assert not (await browser.ask(do='push', efforts=[0.0, 1e-4, 0.0]))['ok']
+        assert not (await browser.ask(do='push', efforts=[0.0, '1']))['ok']
+        await browser.expect(lambda: 'tracker' in browser.values, 'word of a tracker')
+        assert browser.values['tracker'] is None
+        graph.expect(diagnostics.get_subscription_count, 'the live view')
+
+        def is_shown() -> bool:
+            # It speaks again and again, or a browser that is late would see its end only.
+            say('/other/flat_tracker', 'idle')
+            say('/flat_tracker', 'tracking')
+            return browser.values['tracker'] is not None
+
+        await browser.expect(is_shown, 'a tracker')
+        assert browser.values['tracker']['values']['phase'] == 'tracking'
+        await browser.expect(lambda: browser.values['tracker'] is None, 'the end of its words')
 
     view.run(act)
 

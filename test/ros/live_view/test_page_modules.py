@@ -166,6 +166,28 @@ def test_dense_rows_keep_their_extremes_and_gaps(run):
     assert sparse == [None, [0, 2], None, None, [0.2, 6], None, [1, 8]]
 
 
+def test_a_pull_at_the_tip_is_a_force_there(run):
+    """Efforts are the work of the force per angle, by finite differences."""
+    strongest, links, angles = 1.5e-3, [0.3, 0.2, 0.15], [0.4, -0.7, 0.2]
+    reach, scale, base = sum(links), 200.0, np.array([150.0, 160.0])
+
+    def pixels(angles):
+        theta = np.cumsum(angles)
+        steps = scale * np.array(links)[:, None] * np.stack([np.cos(theta), -np.sin(theta)], 1)
+        return np.vstack([base, base + np.cumsum(steps, axis=0)])
+
+    tip, pointer = pixels(angles)[-1], np.array([190.0, 90.0])
+    arm = {'pixels': pixels(angles).tolist(), 'links': links, 'scale': scale, 'reach': reach}
+    efforts = run(
+        "import {pullOf} from './pull.js';",
+        f'pullOf({json.dumps(arm)}, {pointer.tolist()}, {strongest})',
+    )
+    force = (pointer - tip) / scale / reach * strongest / links[-1]
+    for k, effort in enumerate(efforts):
+        moved = pixels(np.array(angles) + 1e-6 * (np.arange(3) == k))[-1]
+        assert effort == pytest.approx(force @ (moved - tip) / scale / 1e-6, rel=1e-4)
+
+
 def test_a_window_moves_with_time_or_stands(run):
     states = run(
         "import {TimeWindow} from './timewindow.js';",

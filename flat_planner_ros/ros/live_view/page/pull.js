@@ -5,7 +5,7 @@ import {$, showAnswer} from './dom.js';
 
 const PERIOD = 50;      // [ms] between two pushes, each of which acts for 100 ms
 const NEAR = 28;        // [px] from the tip within which it is grasped
-const STRONGEST = 0.5;  // [rad] by which the spring gives way at most
+const STRONGEST = 0.25; // [rad] by which the spring gives way at most
 
 export class Pull {
   constructor(canvas, store, send) {

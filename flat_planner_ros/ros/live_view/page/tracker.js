@@ -23,7 +23,7 @@ export class TrackerCard {
     const {level, text, values} = tracker;
     setText($('tracker-level'), values.phase ?? level);
     $('tracker-level').className = `pill ${level}`;
-    setText($('tracker-text'), text);
+    setText($('tracker-text'), level === 'ok' ? '' : text);
     const {error, decay_rate: decay, margin} = values;
     const told = [error === undefined ? '' : `${precise(MILLI * error, 3)} mrad from the plan`,
       decay === undefined ? '' : `errors fall to a third in ${precise(1 / decay, 2)} s`,
