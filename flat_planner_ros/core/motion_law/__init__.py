@@ -37,7 +37,7 @@ from flat_planner_ros.core.motion_law.law import (
     motion_quadrature,
     ScaledLaw,
 )
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, path_cost, PathConditions
 
 __all__ = [
     'BoundaryConditions',
@@ -50,6 +50,7 @@ __all__ = [
     'MAX_DERIVATIVE',
     'motion_quadrature',
     'optimal_path',
+    'path_cost',
     'PathConditions',
     'probes',
     'QuadraticCost',

@@ -65,7 +65,7 @@ _END = np.array([1.0])
 
 _FAR_END = np.array([-2.0])
 
-_ENDS = np.array([-1.0, 1.0])
+_PLACES = np.array([-1.0, 0.0, 1.0])
 
 _MIRRORED = np.tile(ALTERNATING, 2)
 
@@ -242,8 +242,8 @@ class SegmentBasis:
     groups
         Blocks of solutions, each with whether its mirror image is meant; columns below follow
         this order.
-    at_start, at_end
-        Derivatives 0 to 11 of every solution at x = -1 and x = 1, shape (12, 12) [-].
+    at_start, at_middle, at_end
+        Derivatives 0 to 11 of every solution at x = -1, 0 and 1, shape (12, 12) [-].
     rates
         How fast solutions of one parity grow with the order of the derivative, ascending, at
         least 1, shape (6,) [-].
@@ -252,6 +252,7 @@ class SegmentBasis:
 
     groups: tuple[tuple[Block, bool], ...]
     at_start: FloatArray
+    at_middle: FloatArray
     at_end: FloatArray
     rates: FloatArray
 
@@ -282,27 +283,25 @@ def segment_basis(key: bytes, reference: bytes) -> SegmentBasis:
     found = sorted(_spectrum(reference).clusters(scale), key=lambda cluster: abs(cluster.centre))
     groups: list[tuple[Block, bool]] = []
     rates: list[float] = []
-    starts: list[FloatArray] = []
-    ends: list[FloatArray] = []
+    places: list[FloatArray] = []
     for cluster in found:
         even = block_of(cluster, 1.0)
         rates += [even.growth] * len(even.columns)
         if even.origin == 0:
             for block in (even, block_of(cluster, -1.0)):
                 groups.append((block, False))
-                at_start, at_end = _ends(block, _ENDS)
-                starts.append(at_start)
-                ends.append(at_end)
+                places.append(_derivatives_at(block, _PLACES))
             continue
-        far, near = _ends(even, _ENDS - 1.0)
+        found_at = _derivatives_at(even, _PLACES - 1.0)
         # Each solution by itself, not odd and even ones: a boundary layer stays at its own end.
         groups += [(even, False), (even, True)]
-        starts += [far, _MIRRORED * near]
-        ends += [near, _MIRRORED * far]
+        places += [found_at, _MIRRORED * found_at[::-1]]
+    at_start, at_middle, at_end = np.concatenate(places, axis=1).swapaxes(1, 2)
     return SegmentBasis(
         groups=tuple(groups),
-        at_start=np.concatenate(starts).T,
-        at_end=np.concatenate(ends).T,
+        at_start=at_start,
+        at_middle=at_middle,
+        at_end=at_end,
         rates=np.array(sorted(rates)),
     )
 
@@ -323,10 +322,10 @@ def _scale(coefficients: FloatArray, reference: FloatArray) -> float:
     return float(ratio ** (0.5 / (CONDITIONS - lowest)))
 
 
-def _ends(block: Block, places: FloatArray) -> list[FloatArray]:
-    """Return derivatives 0 to 11 of a block's solutions at distances from their origin."""
+def _derivatives_at(block: Block, places: FloatArray) -> FloatArray:
+    """Return derivatives 0 to 11 of solutions at distances from their origin, (m, columns, 12)."""
     series = _ALONE[: len(block.columns)] if block.series is None else block.series
-    return [ends.real for ends in _derivatives(block.rate, series, places, SOLUTIONS - 1)]
+    return np.real(_derivatives(block.rate, series, places, SOLUTIONS - 1))
 
 
 def row_factors(rates: Sequence[float]) -> FloatArray:

@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import ceil, log2
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import checked_array, FloatArray, InvalidRequest, strict_arithmetic
 from flat_planner_ros.core.motion_law.basis import (
@@ -126,16 +127,7 @@ def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
         The numbers leave double precision.
 
     """
-    coefficients = cost.characteristic()
-    halves = 0.5 * np.diff(path.edges)
-    powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
-    reference = _reference(coefficients).tobytes()
-    bases = [segment_basis(key.tobytes(), reference) for key in rounded(coefficients * powers)]
-    # Each segment counts from the value at its start: only steps enter the equations, and a short
-    # segment far from zero loses no digits.
-    origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
-    steps = path.values - origins
-    amplitudes = _amplitudes(bases, halves, path, steps)
+    bases, halves, origins, steps, amplitudes = _solved(cost, path)
     parts = []
     for variable, (origin, step) in enumerate(zip(origins, steps, strict=True)):
         laws = tuple(
@@ -156,6 +148,55 @@ def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
         boundary_residual=max(rounding, *(part.boundary_residual for part in parts)),
         optimality_residual=max(part.optimality_residual for part in parts),
     )
+
+
+class _Solution(NamedTuple):
+    """Bases and half lengths of the segments, values at their starts, steps, and amplitudes."""
+
+    bases: list[SegmentBasis]
+    halves: FloatArray
+    origins: FloatArray
+    steps: FloatArray
+    amplitudes: Amplitudes
+
+
+def _solved(cost: QuadraticCost, path: PathConditions) -> _Solution:
+    """Return the laws of least cost in terms of the solutions on every segment."""
+    coefficients = cost.characteristic()
+    halves = 0.5 * np.diff(path.edges)
+    powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
+    reference = _reference(coefficients).tobytes()
+    bases = [segment_basis(key.tobytes(), reference) for key in rounded(coefficients * powers)]
+    # Each segment counts from the value at its start: only steps enter the equations, and a short
+    # segment far from zero loses no digits.
+    origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
+    steps = path.values - origins
+    return _Solution(bases, halves, origins, steps, _amplitudes(bases, halves, path, steps))
+
+
+@strict_arithmetic()
+def path_cost(cost: QuadraticCost, path: PathConditions) -> tuple[float, FloatArray]:
+    """
+    Return the cost of the laws of least cost, and its slopes by the times of the via points.
+
+    As in `OptimalPath`, but nothing is certified: for searches.
+
+    Raises
+    ------
+    UncertifiedPlan, ArithmeticError
+        As by `optimal_path`.
+
+    """
+    bases, halves, _, steps, amplitudes = _solved(cost, path)
+    powers = halves[:, None, None] ** -np.arange(float(SOLUTIONS))[:, None]
+    tables = ([basis.at_middle for basis in bases], [basis.at_end for basis in bases])
+    middles, ends = (np.array(table) @ amplitudes.values * powers for table in tables)
+    costates = -np.einsum('k,pkm->pm', cost.characteristic()[1:], middles[:, 1::2])
+    start = bases[0].at_start @ amplitudes.values[0] * powers[0]
+    value = np.sum(costates * steps.T) - sum(_share_of_start(cost, jet) for jet in start.T)
+    speeds = ends[:-1, 1] + path.relaxations * ends[:-1, 2]
+    slopes: FloatArray = 2.0 * np.sum(np.diff(costates, axis=0) * speeds, axis=1)
+    return float(value), slopes
 
 
 def _certified(

@@ -32,7 +32,7 @@ from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedPlan
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     costate,
-    optimal_path,
+    path_cost,
     PathConditions,
     QuadraticCost,
 )
@@ -147,18 +147,18 @@ def _log_cost(
     """Return the logarithm of the cost and its gradient."""
     duration = float(path.edges[-1])
     edges = _edges(logarithms, duration)
-    found = optimal_path(
+    value, slopes = path_cost(
         cost,
         PathConditions(
             edges=edges, start=path.start, values=path.values, relaxations=path.relaxations
         ),
     )
     # A longer segment moves all later edges but the last.
-    by_length = np.append(np.cumsum(found.time_slopes[::-1])[::-1], 0.0)
+    by_length = np.append(np.cumsum(slopes[::-1])[::-1], 0.0)
     shares = _shares(logarithms)
     by_logarithm = shares * (by_length - shares @ by_length)
-    scale = duration * (1.0 - LEAST_SHARE) / found.cost_value
-    return float(np.log(found.cost_value)), scale * by_logarithm
+    scale = duration * (1.0 - LEAST_SHARE) / value
+    return float(np.log(value)), scale * by_logarithm
 
 
 def stop_plan(

@@ -21,7 +21,7 @@ from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.motion_law.basis import segment_basis
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremals
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, path_cost, PathConditions
 import numpy as np
 from path_programme import programmed_path
 import pytest
@@ -203,6 +203,16 @@ def test_fifty_points_of_three_variables(costs, name):
             costs[name], path(edges, passed, start[index], RELAXATION if index == 0 else 0.0)
         )
         assert worst(segment_jets(law, 6), segment_jets(alone.laws[0], 6)) < 1e-11
+
+
+@pytest.mark.parametrize('name', STRATEGIES)
+def test_the_cost_alone_is_that_of_the_laws(costs, name):
+    edges, values = np.array([0.0, 0.5, 0.9, 2.6]), np.array([1.0, 0.4, 2.0])
+    conditions = path(edges, values, MOVING, RELAXATION)
+    found = certified(costs[name], conditions)
+    cost, slopes = path_cost(costs[name], conditions)
+    assert cost == pytest.approx(found.cost_value, rel=1e-9)
+    assert slopes == pytest.approx(found.time_slopes, rel=1e-8)
 
 
 def test_the_work_is_that_of_the_segments(costs):
