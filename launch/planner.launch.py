@@ -117,7 +117,7 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument(
                 'dds_profile',
-                default_value='none',
+                default_value='auto',
                 description='profiles of Fast DDS; auto = config/dds/fastdds.xml of this package, '
                 'unless the environment names a file; none = leave Fast DDS as it is',
             ),

@@ -15,8 +15,10 @@
 """The planner, the plant and the monitor in one process, for a first look."""
 
 from collections.abc import Sequence
+import os
 import sys
 
+from flat_planner_ros.ros.dds_profile import profile_environment
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
@@ -25,6 +27,7 @@ from flat_planner_ros.ros.nodes.plant_node import PlantNode
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the three nodes."""
+    os.environ.update(profile_environment(os.environ))
     return run([PlannerNode, PlantNode, MonitorNode], args)
 
 

@@ -146,7 +146,7 @@ NODES = ['flat_planner', 'flat_plant', 'flat_monitor']
 
 
 def test_nodes_are_given_the_profiles_of_the_middleware(launched):
-    records = launched.run('demo.launch.py', 'view:=false', 'dds_profile:=auto', names=NODES)
+    records = launched.run('demo.launch.py', 'view:=false', names=NODES)
     assert {Path(record[2]).name for record in records.values()} == {'fastdds.xml'}
 
 
