@@ -100,7 +100,7 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
             _refuse_strays(sys.argv if args is None else args)
             _init(args)
             is_open = True
-            executor = _new_executor()
+            executor = new_executor()
             executors.append(executor)
             for create in creators:
                 if interrupted.is_set():
@@ -202,7 +202,7 @@ def signals_caught() -> Iterator[Event]:
             signal.signal(number, handler)
 
 
-def _new_executor() -> Executor:
+def new_executor() -> Executor:
     """Return the executor that needs least time per message (benchmarks/README.md)."""
     if os.environ.get(EXECUTOR, 'events') == 'events':
         try:

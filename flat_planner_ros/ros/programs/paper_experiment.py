@@ -31,6 +31,7 @@ from flat_planner_ros.figures.paper_example import (
     Result,
     Scenario,
 )
+from flat_planner_ros.ros.nodes.node_runner import new_executor
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
@@ -129,6 +130,8 @@ class Experimenter(Node):
     ) -> None:
         super().__init__('paper_table')
         self._drive = drive
+        self._spinner = new_executor()
+        self._spinner.add_node(self)
         self._lead = LEAD * max(speed, 1.0)
         self._processes = processes
         self._interrupted = interrupted
@@ -318,7 +321,7 @@ class Experimenter(Node):
                 raise ExperimentFailed('one of the three nodes has ended')
             if monotonic() > deadline:
                 return False
-            rclpy.spin_once(self, timeout_sec=0.1)
+            self._spinner.spin_once(timeout_sec=0.1)
         return True
 
 
