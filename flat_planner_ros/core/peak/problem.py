@@ -195,6 +195,8 @@ class PeakProblem:
         """Return the motion whose velocity keeps its bound between the knots too."""
         bound = self.settings.velocity
         found = self._bounded(inf).motion()
+        if bound == inf:
+            return found
         cap = bound
         for _ in range(VELOCITY_ROUNDS):
             reached = self.distance * found.peak_velocity

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.peak.least_sum import least_sum
 import numpy as np
 
 FEASIBILITY = 1e-10
@@ -81,14 +82,33 @@ class PeakProgramme:
     cap_target: FloatArray
     cap_limits: FloatArray
 
-    def solve(self) -> 'PeakSolution | None':
+    def solve(self) -> PeakSolution | None:
         """Return the coefficients of least peak; None where no motion meets the bounds."""
-        from scipy.optimize import linprog
-
         # Orthonormal: in a fast motion the rows of the swing are nearly those of a rigid link.
         orthonormal, triangle = np.linalg.qr((self.rows / self._sizes[:, None]).T)
         rows = orthonormal.T
         target = np.linalg.solve(triangle.T, self.target / self._sizes)
+        found = None if len(self.caps) else self._by_duals(rows, target)
+        if found is None:
+            found = self._by_general_solver(rows, target)
+        if found is None:
+            return None
+        multipliers = np.linalg.solve(triangle, found.multipliers) / self._sizes
+        return found._replace(multipliers=multipliers)
+
+    def _by_duals(self, rows: FloatArray, target: FloatArray) -> PeakSolution | None:
+        """Return the solution for orthonormal rows; None where the search does not end."""
+        found = least_sum(rows, target)
+        if found is None:
+            return None
+        # The inverse of a vertex leaves its condition number of roundings.
+        share = found.values + rows.T @ (target * found.gain - rows @ found.values)
+        return PeakSolution(share / found.gain, found.multipliers, np.zeros(0))
+
+    def _by_general_solver(self, rows: FloatArray, target: FloatArray) -> PeakSolution | None:
+        """Return the same with bounded quantities, by HiGHS."""
+        from scipy.optimize import linprog
+
         # No drive of peak 1 reaches further: y in these units is at most about 1.
         unit = float(np.max(np.abs(target) / np.abs(rows).sum(axis=1)))
         equations = np.column_stack([rows, -target / unit])
@@ -117,14 +137,8 @@ class PeakProgramme:
         share[free] += change[:-1]
         least += float(change[-1])
         share += rows.T @ (target * least - rows @ share)
-        duals = found.eqlin.marginals
-        if not len(self.caps):
-            # The same for the dual values: a coefficient within its bounds is worth nothing.
-            miss = np.append(rows[:, free].T @ duals, 0.0)
-            duals = duals - np.linalg.lstsq(worth.T, miss, rcond=RANK)[0]
         above, below = np.split(found.ineqlin.marginals / cap_sizes, 2)
-        multipliers = np.linalg.solve(triangle, duals) / self._sizes
-        return PeakSolution(share / least, multipliers, below - above)
+        return PeakSolution(share / least, found.eqlin.marginals, below - above)
 
     @property
     def _sizes(self) -> FloatArray:

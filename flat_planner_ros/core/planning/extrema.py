@@ -70,6 +70,9 @@ DENSITY = 4
 NEWTON_STEPS = 4
 """Steps that square the spacing of the search down to rounding."""
 
+TINY = 1e-300
+"""Keeps quantities that are zero throughout from a division by zero."""
+
 NEAR_PEAK = 0.1
 """Share of the range below the highest place within which every local extremum is refined [-]."""
 
@@ -259,6 +262,9 @@ def _top_times(mesh: _Mesh) -> FloatArray:
         nodes = np.repeat(values, DENSITY, axis=-1)[..., : places.shape[-1]]
         places = np.where(mesh.resolved[:, None], places, nodes)
     highest, lowest = places.max(axis=(1, 2)), places.min(axis=(1, 2))
+    # In steps of what is rounding, so that a plateau has few tops.
+    grain = NOISE * np.maximum(np.abs(highest), np.abs(lowest)) + TINY
+    places = np.rint(places / grain[:, None, None]) * grain[:, None, None]
     tops = places >= (highest - NEAR_PEAK * (highest - lowest))[:, None, None]
     # A plateau has one top, its first place.
     tops[..., 1:] &= places[..., 1:] > places[..., :-1]
