@@ -38,7 +38,7 @@ WINGS = {
     'arm': '',
     'motion_law': 'arm',
     'insensitive': 'motion_law arm',
-    'peak': 'motion_law arm',
+    'peak': 'motion_law insensitive arm',
     'planning': 'motion_law insensitive peak arm',
     'session': 'planning tracking arm',
     'plant': 'arm',

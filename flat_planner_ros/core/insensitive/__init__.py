@@ -34,6 +34,7 @@ from flat_planner_ros.core.insensitive.law import (
     insensitive_motion_from,
     InsensitiveMotion,
 )
+from flat_planner_ros.core.insensitive.oscillator import largest, Oscillator
 from flat_planner_ros.core.insensitive.residual import (
     predict_residual,
     PredictedResidual,
@@ -50,10 +51,12 @@ __all__ = [
     'insensitive_motion_from',
     'InsensitiveMotion',
     'Insensitivity',
+    'largest',
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
     'MAX_PAYLOAD',
     'Nominal',
+    'Oscillator',
     'predict_residual',
     'PredictedResidual',
     'servo_effort',

@@ -20,11 +20,13 @@ from flat_planner_ros.core.peak.motion import (
     check_peak,
     peak_motion,
     peak_motion_from,
-    shortest_peak_duration,
-    shortest_peak_duration_from,
 )
 from flat_planner_ros.core.peak.problem import PeakMotion
 from flat_planner_ros.core.peak.settings import MAX_INTERVALS, MIN_INTERVALS, PeakSettings
+from flat_planner_ros.core.peak.shortest import (
+    shortest_peak_duration,
+    shortest_peak_duration_from,
+)
 
 __all__ = [
     'check_peak',

@@ -33,6 +33,12 @@ GRID_PER_TURN = 40
 MIN_GRID = 400
 """Fewest of these points."""
 
+ROOT_STEPS = 60
+"""Steps towards a duration; five are usual, and halvings alone would do with so many."""
+
+ROUNDING = 1e-13
+"""Distance from a root, relative to what is sought, at which it is found [-]."""
+
 NEWTON_STEPS = 3
 """Steps that square the distance of a switch to its place, from the chord's."""
 
@@ -54,7 +60,7 @@ class SwitchingFunction:
     mode: DrivenMode
     multipliers: FloatArray
 
-    def at(self, left: FloatArray) -> FloatArray:
+    def at(self, left: FloatArray | float) -> FloatArray:
         """Return the values, shape (m,)."""
         swing, slope = self._amplitudes
         growth = np.exp(self.mode.pole * left)
@@ -62,7 +68,7 @@ class SwitchingFunction:
         values: FloatArray = self.mode.gain * line + ((swing + slope * left) * growth).real
         return values
 
-    def area(self, left: FloatArray) -> FloatArray:
+    def area(self, left: FloatArray | float) -> FloatArray:
         """Return an antiderivative, shape (m,), or () of a number."""
         swing, slope = self._amplitudes
         pole = self.mode.pole
@@ -126,15 +132,24 @@ class SwitchingFunction:
             A duration in which it is met [s].
 
         """
-        from scipy.optimize import brentq
-
         edges = np.concatenate([[0.0], self.switches(longest), [longest]])
         reached = peak * np.append(0.0, np.cumsum(np.abs(np.diff(self.area(edges)))))
         last = int(np.searchsorted(reached, target))
         if last >= len(edges):
             return longest
-        low, high = edges[last - 1], edges[last]
-        begin, end = (float(self.area(edge)) for edge in (low, high))
-        # Between two switches s has one sign.
-        sought = min((target - reached[last - 1]) / peak, abs(end - begin))
-        return float(brentq(lambda left: abs(float(self.area(left)) - begin) - sought, low, high))
+        low, high = float(edges[last - 1]), float(edges[last])
+        # Between two switches s has one sign, and the area runs one way.
+        sought = (target - float(reached[last - 1])) / peak
+        begin = float(self.area(low))
+        left = high
+        for _ in range(ROOT_STEPS):
+            excess = abs(float(self.area(left)) - begin) - sought
+            if abs(excess) <= ROUNDING * abs(sought):
+                break
+            low, high = (low, left) if excess > 0.0 else (left, high)
+            slope = abs(float(self.at(left)))
+            # Newton's method, halving where it would leave the bracket.
+            left = left - excess / slope if slope > 0.0 else low
+            if not low < left < high:
+                left = 0.5 * (low + high)
+        return left

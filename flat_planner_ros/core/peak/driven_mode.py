@@ -121,6 +121,11 @@ class DrivenMode:
         """Rate of the swing for each unit of the drive."""
         return self.gain * self.frequency**2
 
+    @property
+    def compliance(self) -> float:
+        """Return the angle of the passive joint for each unit of -w'', I_n / k [s^2]."""
+        return self.reaction + self.frequency**-2
+
     def state(self, jet: FloatArray) -> ModeState:
         """Return the state from the derivatives 0 to 3 of w."""
         sigma = jet[0] + self.relaxation * jet[1] + jet[2] / self.frequency**2
@@ -166,12 +171,7 @@ class DrivenMode:
         """
         step = duration / pieces
         left = duration - step * np.arange(pieces + 1.0)
-        turn = self.pole * step
-        after, before = half_hat(-turn), half_hat(turn)
-        hats = np.full(pieces + 1, after + before)
-        hats[0], hats[-1] = after, before
-        decayed = step * np.exp(self.pole * left)
-        swing = self.swing_gain * hats * decayed
+        swing = self.swing_row(self.pole, duration, pieces)
         weights = np.full(pieces + 1, step)
         weights[[0, -1]] *= 0.5
         reach = weights * left
@@ -179,11 +179,23 @@ class DrivenMode:
         reach[-1] += step**2 / 6.0
         rows = [self.gain * weights, self.gain * reach, swing.real, swing.imag]
         if insensitive:
+            turn = self.pole * step
             slopes = np.full(pieces + 1, half_hat(turn, 1) - half_hat(-turn, 1))
             slopes[0], slopes[-1] = -half_hat(-turn, 1), half_hat(turn, 1)
-            slope = self.swing_gain * decayed * (step * slopes + hats * left)
+            slope = self.swing_gain * step**2 * slopes * np.exp(self.pole * left) + swing * left
             rows += [slope.real, slope.imag]
         return np.array(rows)
+
+    def swing_row(self, pole: complex, duration: float, pieces: int) -> ComplexArray:
+        """Return what each sample of the drive adds to a swing of a pole, shape (pieces + 1,)."""
+        step = duration / pieces
+        turn = pole * step
+        after, before = half_hat(-turn), half_hat(turn)
+        hats = np.full(pieces + 1, after + before)
+        hats[0], hats[-1] = after, before
+        left = duration - step * np.arange(pieces + 1.0)
+        row: ComplexArray = self.swing_gain * step * hats * np.exp(pole * left)
+        return row
 
     def states(self, start: ModeState, drive: FloatArray, duration: float) -> ModeState:
         """

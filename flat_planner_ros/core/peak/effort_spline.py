@@ -77,20 +77,25 @@ class EffortSpline:
         inner = np.matmul(self.weights, parts[..., None])[..., 0]
         return np.append(inner.ravel(), coefficients[-1])
 
-    def interval_rows(self, rows: FloatArray, index: int) -> FloatArray:
+    def interval_rows(
+        self, rows: FloatArray, index: int, first: int = 0, last: int | None = None
+    ) -> FloatArray:
         """
-        Return functionals of the samples of one interval as such of its coefficients.
+        Return functionals of some samples of one interval as such of its coefficients.
 
         Parameters
         ----------
         rows
-            Functionals of its samples, both ends included, shape (r, pieces + 1).
+            Functionals of these samples, shape (r, last - first + 1).
         index
             Which interval, not the last one.
+        first, last
+            Pieces of the interval at whose starts the samples are; None for those up to its end.
 
         """
-        end = np.array([0.0, 0.5, 0.5])
-        part: FloatArray = rows[:, :-1] @ self.weights[index] + np.multiply.outer(rows[:, -1], end)
+        weights = np.concatenate([self.weights[index], [[0.0, 0.5, 0.5]]])
+        stop = self.pieces if last is None else last
+        part: FloatArray = rows @ weights[first : stop + 1]
         return part
 
     def gathered(self, rows: FloatArray) -> FloatArray:

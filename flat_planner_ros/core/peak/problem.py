@@ -24,12 +24,15 @@ from math import ceil, inf, pi
 
 from flat_planner_ros.core.arm import FloatArray, OutOfReach
 from flat_planner_ros.core.peak.bound import SwitchingFunction
+from flat_planner_ros.core.peak.bounds import Bound, Caps, Course
+from flat_planner_ros.core.peak.bracket import between, Tried
 from flat_planner_ros.core.peak.driven_mode import DrivenMode, ModeState
 from flat_planner_ros.core.peak.effort_spline import EffortSpline
 from flat_planner_ros.core.peak.law import LinearEffortLaw
 from flat_planner_ros.core.peak.programme import PeakProgramme
 from flat_planner_ros.core.peak.settings import PeakSettings
 import numpy as np
+from numpy.typing import NDArray
 
 PIECES = 4
 """Pieces of the sampled drive per interval of its spline, or more."""
@@ -49,23 +52,28 @@ PLACE = 1
 START_ORDERS = 5
 """Derivatives of the planned variable that a start gives, the value included."""
 
-VELOCITY_ROUNDS = 6
-"""Programmes after which the velocity is taken as it is."""
-
-VELOCITY_MARGIN = 1e-5
-"""Share of the velocity that is kept in reserve between the places where it is looked at [-]."""
-
 STRIDE = 4.0
 """Largest ratio of a duration to the next one tried, beyond what a bad guess is off [-]."""
 
 BACK_STRIDE = 1.2
 """The same towards shorter ones, after a step that went a little too far [-]."""
 
+MOST_PIECES = 1000
+"""Most pieces of a drive with bounds for which durations are tried."""
+
+BOUND_STEPS = 6
+"""Durations that are tried for one that dual values rule out within bounds."""
+
+NODES_PER_PIECE = 3
+"""Gauss-Legendre nodes on each piece, over which a switching function with bounds is summed."""
+
 PLACES = 400
 """Durations in between at which is looked whether the dual values rule them out."""
 
 PLACES_PER_PIECE = 4
 """Places between two samples at which the velocity is looked at."""
+
+_NODES, _SHARES = np.polynomial.legendre.leggauss(NODES_PER_PIECE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,6 +93,12 @@ class PeakProblem:
         What 1 rad of them stands for [rad].
     place
         From where they are counted [rad].
+    bounds
+        On more than the peak.
+    least_intervals
+        Of the spline, whatever the settings ask for.
+    idle
+        First interval and last one, exclusive, in the midst of which the drive rests.
 
     """
 
@@ -95,13 +109,17 @@ class PeakProblem:
     final: float | None
     distance: float
     place: float = 0.0
+    bounds: tuple[Bound, ...] = ()
+    least_intervals: int = 0
+    idle: tuple[int, int] = (0, 0)
 
     @cached_property
     def spline(self) -> EffortSpline:
         """Return the form of the drive."""
         turn = self.mode.frequency * self.duration
         needed = ceil(INTERVALS_PER_TURN * turn / (2.0 * pi))
-        intervals = min(max(self.settings.intervals, needed), MOST_INTERVALS)
+        wanted = max(self.settings.intervals, self.least_intervals, needed)
+        intervals = min(wanted, MOST_INTERVALS)
         return EffortSpline(
             intervals=intervals, pieces=max(PIECES, ceil(turn / (MAX_TURN * intervals)))
         )
@@ -123,12 +141,17 @@ class PeakProblem:
 
     def targets(self, durations: FloatArray) -> FloatArray:
         """Return the same for other durations, shape (r, m)."""
-        swings = self.state.swing * np.exp(self.mode.pole * durations)
+        growth = np.exp(self.mode.pole * durations)
+        swings = self.state.swing * growth
         targets = np.zeros((6 if self.settings.insensitive else 4, len(durations)))
         targets[0] = -self.state.sigma_rate
         targets[2:4] = -swings.real, -swings.imag
         if self.final is not None:
             targets[PLACE] = self.final - self.state.sigma - self.state.sigma_rate * durations
+        if self.settings.insensitive:
+            # The deflection at the start stays what it is, whatever the stiffness.
+            slopes = swings * durations + self.start[2] * growth
+            targets[4:] = -slopes.real, -slopes.imag
         return targets
 
     @property
@@ -145,84 +168,73 @@ class PeakProblem:
             self.duration, pieces, insensitive=self.settings.insensitive
         )
         rows = self.spline.gathered(by_sample[self.conditions])
-        caps, offsets, limits = self._caps()
+        target = self.target[self.conditions]
+        if self.idle[1] > 0:
+            quiet_rows, quiet_target = self._quiet()
+            rows = np.concatenate([rows, quiet_rows])
+            target = np.append(target, quiet_target)
+        caps, offsets, limits = Caps.together(self.caps, self.spline.size)
         return PeakProgramme(
-            rows=rows[:, 1:-1],
-            target=self.target[self.conditions] - rows[:, 0] * self.first_drive,
-            caps=caps[:, 1:-1],
+            rows=rows[:, self._free],
+            target=target - rows[:, 0] * self.first_drive,
+            caps=caps[:, self._free],
             cap_target=offsets + caps[:, 0] * self.first_drive,
             cap_limits=limits,
         )
 
-    def _caps(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the bounded quantities in all coefficients, at rest in them, and bounds."""
-        size = self.spline.size
-        caps, offsets, limits = [np.empty((0, size))], [np.empty(0)], [np.empty(0)]
-        if self.settings.effort_rate > 0.0:
-            spacing = self.duration / self.spline.intervals * self.spline.spans
-            caps.append(np.diff(np.eye(size), axis=0) / spacing[:, None])
-            offsets.append(np.zeros(size - 1))
-            limits.append(np.full(size - 1, self.settings.effort_rate / self.distance))
-        if self.settings.velocity < inf:
-            matrix, start = self._velocities()
-            caps.append(matrix)
-            offsets.append(start)
-            limits.append(np.full(len(start), self.settings.velocity / self.distance))
-        return np.concatenate(caps), np.concatenate(offsets), np.concatenate(limits)
+    def _quiet(self) -> tuple[FloatArray, FloatArray]:
+        """Return the conditions that no swing is left where the drive begins to rest."""
+        pieces = self.idle[0] * self.spline.pieces
+        until = self.duration * self.idle[0] / self.spline.intervals
+        samples = np.zeros((2, self.course.pieces + 1))
+        samples[:, : pieces + 1] = self.mode.end_rows(until, pieces, insensitive=False)[2:4]
+        free = self.state.swing * np.exp(self.mode.pole * until)
+        return self.spline.gathered(samples), np.array([-free.real, -free.imag])
 
-    def _velocities(self) -> tuple[FloatArray, FloatArray]:
-        """Return the velocity of link n-1 at the spline's knots, in coefficients and before."""
-        spline, mode = self.spline, self.mode
-        step = self.duration / spline.intervals
-        rows = mode.end_rows(step, spline.pieces, insensitive=False)
-        growth = np.exp(mode.pole * step)
-        rate, swing = np.zeros(spline.size), np.zeros(spline.size, dtype=complex)
-        free = self.state.swing
-        matrix, start = [], []
-        for index in range(spline.intervals - 1):
-            part = slice(index, index + 3)
-            local = spline.interval_rows(rows, index)
-            swing = growth * swing
-            rate = rate.copy()
-            rate[part] += local[0]
-            swing[part] += local[2] + 1j * local[3]
-            free = growth * free
-            matrix.append(rate + mode.reaction * mode.jerk(swing))
-            start.append(self.state.sigma_rate + mode.reaction * mode.jerk(free))
-        return np.array(matrix), np.array(start)
+    @cached_property
+    def _free(self) -> NDArray[np.intp]:
+        """Return which coefficients of the drive are free."""
+        first, last = self.idle
+        every = np.arange(1, self.spline.size - 1)
+        return every[(every < first) | (every >= last)]
 
-    def motion_within_velocity(self) -> 'PeakMotion':
-        """Return the motion whose velocity keeps its bound between the knots too."""
-        bound = self.settings.velocity
-        found = self._bounded(inf).motion()
-        if bound == inf:
-            return found
-        cap = bound
-        for _ in range(VELOCITY_ROUNDS):
-            reached = self.distance * found.peak_velocity
-            if reached <= bound:
-                break
-            found = self._bounded(cap).motion()
-            cap *= (1.0 - VELOCITY_MARGIN) * min(
-                1.0, bound / (self.distance * found.peak_velocity)
-            )
-        return found
+    @property
+    def is_idle(self) -> NDArray[np.bool_]:
+        """Return at which of `Course.halves` the drive rests."""
+        first, last = self.idle
+        interval = self.duration / self.spline.intervals
+        halves = self.course.halves
+        # One interval more at either end, where the velocity is that of the rest.
+        return (halves > first * interval) & (halves < (last - 1) * interval)
 
-    def _bounded(self, velocity: float) -> 'PeakProblem':
-        """Return the same with another bound on the velocity at the spline's knots."""
-        return replace(self, settings=replace(self.settings, velocity=velocity))
+    @cached_property
+    def course(self) -> Course:
+        """Return what is driven by which spline."""
+        return Course(mode=self.mode, spline=self.spline, duration=self.duration, state=self.state)
+
+    @cached_property
+    def caps(self) -> list[Caps]:
+        """Return each bound in all coefficients."""
+        return [bound.caps(self.course) for bound in self.bounds]
+
+    def lasting(self, duration: float) -> 'PeakProblem':
+        """Return the same with another duration."""
+        return replace(self, duration=duration)
 
     def motion(self) -> 'PeakMotion':
         """Return the motion with its certificate."""
         solution = self.programme.solve()
         if solution is None:
             raise self._refusal()
-        coefficients = np.concatenate([[self.first_drive], solution.coefficients, [0.0]])
+        coefficients = np.zeros(self.spline.size)
+        coefficients[0] = self.first_drive
+        coefficients[self._free] = solution.coefficients
         peak = float(np.abs(coefficients).max())
         multipliers = np.zeros(len(self.target))
-        multipliers[self.conditions] = solution.multipliers
+        multipliers[self.conditions] = solution.multipliers[: len(self.conditions)]
         switching = SwitchingFunction(mode=self.mode, multipliers=multipliers)
-        target = float(multipliers @ self.target)
+        edges = np.cumsum([len(part.limits) for part in self.caps])
+        of_bounds = tuple(np.split(solution.cap_multipliers, edges)[: len(self.caps)])
         # No effort is less than the one that acts at the start.
         first = abs(self.first_drive)
         proven = max(self.programme.proven_peak(solution), first)
@@ -231,21 +243,56 @@ class PeakProblem:
             samples=self.spline.samples(coefficients),
             peak=peak,
             inner_peak=float(np.abs(solution.coefficients).max()),
-            least_peak=max(target / switching.magnitude(self.duration), first),
+            least_peak=max(self.proven_peak(switching, of_bounds), first),
             optimality_residual=abs(peak / proven - 1.0),
             switching=switching,
-            target=target,
+            of_bounds=of_bounds,
+            target=float(multipliers @ self.target),
         )
+
+    def proven_peak(
+        self, switching: SwitchingFunction, of_bounds: tuple[FloatArray, ...]
+    ) -> float:
+        """
+        Return the peak below which no drive whatsoever makes this motion.
+
+        Parameters
+        ----------
+        switching
+            Of any multipliers of the conditions.
+        of_bounds
+            Any multipliers of the bounds, one array for each; without them the integral is in
+            closed form, with them a sum, good to 1e-5 of itself.
+
+        References
+        ----------
+        (B7) and (B10) of docs/derivation.md.
+
+        """
+        gain = float(switching.multipliers @ self.target)
+        if not any(multipliers.any() for multipliers in of_bounds):
+            return gain / switching.magnitude(self.duration)
+        pieces = self.course.pieces
+        step = self.duration / pieces
+        starts = step * np.arange(pieces)
+        times = (starts[:, None] + 0.5 * step * (_NODES + 1.0)).ravel()
+        values = switching.at(self.duration - times)
+        for bound, multipliers in zip(self.bounds, of_bounds, strict=True):
+            gain += bound.worth(self.course, multipliers)
+            values -= bound.weighed(self.course, multipliers, times)
+        magnitude = float(np.abs(values).reshape(pieces, -1).sum(axis=0) @ _SHARES)
+        return gain / (0.5 * step * magnitude)
 
     def _refusal(self) -> OutOfReach:
         """Return the refusal of a motion that is too short for its bounds."""
-        rate, velocity = self.settings.effort_rate, self.settings.velocity
+        wanted = self.settings
         return OutOfReach(
             'effort',
             inf,
-            rate,
-            f'no motion of {self.duration:g} s keeps within peak.effort_rate = {rate:g} '
-            f'(0 = none) and a velocity of {velocity:g} rad/s: use a longer duration',
+            wanted.effort_rate,
+            f'no motion of {self.duration:g} s keeps within peak.effort_rate = '
+            f'{wanted.effort_rate:g}, peak.max_residual = {wanted.max_residual:g} (0 = none) and '
+            f'a velocity of {wanted.velocity:g} rad/s: use a longer duration',
         )
 
 
@@ -270,6 +317,8 @@ class PeakMotion:
         Distance of the peak to what the dual values prove for this spline [-].
     switching
         The switching function that proves it.
+    of_bounds
+        Dual values of the bounds, one array for each.
     target
         Its conditions, p b: any motion has this integral of drive times switching function.
 
@@ -282,6 +331,7 @@ class PeakMotion:
     least_peak: float
     optimality_residual: float
     switching: SwitchingFunction
+    of_bounds: tuple[FloatArray, ...]
     target: float
 
     @cached_property
@@ -300,19 +350,60 @@ class PeakMotion:
         jet[0] -= jet[0, -1] if self.problem.final is None else self.problem.final
         return float((np.abs(jet[:, -1]) / peaks).max())
 
+    def velocities(self, times: FloatArray) -> FloatArray:
+        """Return the velocity of link n-1 at times, shape (m,) [rad/s]."""
+        mode = self.problem.mode
+        jet = self.law.jet(times, 3)
+        sigma_rate = jet[1] + mode.relaxation * jet[2] + jet[3] / mode.frequency**2
+        velocities: FloatArray = sigma_rate + mode.reaction * jet[3]
+        return velocities
+
     @property
     def peak_velocity(self) -> float:
         """Return the largest velocity of link n-1, at and between the samples [rad/s]."""
-        mode, law = self.problem.mode, self.law
         pieces = PLACES_PER_PIECE * (len(self.samples) - 1)
-        jet = law.jet(np.arange(pieces + 1.0) / pieces * law.duration, 3)
-        sigma_rate = jet[1] + mode.relaxation * jet[2] + jet[3] / mode.frequency**2
-        return float(np.abs(sigma_rate + mode.reaction * jet[3]).max())
+        times = np.arange(pieces + 1.0) / pieces * self.law.duration
+        return float(np.abs(self.velocities(times)).max())
 
     @property
     def least_duration(self) -> float:
         """Return the duration below which no motion from rest to rest has as small a peak [s]."""
-        return self.switching.shortest_duration(self.target, self.peak, self.problem.duration)
+        problem = self.problem
+        least = self.switching.shortest_duration(self.target, self.peak, problem.duration)
+        if not self.of_bounds:
+            return least
+        # No link goes further than at full speed all the time.
+        least = max(least, problem.distance / problem.settings.velocity)
+        if problem.course.pieces > MOST_PIECES:
+            return least
+        return max(least, self._least_duration_within())
+
+    def _least_duration_within(self) -> float:
+        """Return the same within the bounds: the longest of the durations tried and ruled out."""
+        low = Tried(0.0, inf)
+        high = Tried(self.problem.duration, self.least_peak / self.peak)
+        ruled_out = 0.0
+        # Whatever the spline, what its dual values prove holds for every drive.
+        problem = replace(
+            self.problem,
+            bounds=tuple(bound.everywhere() for bound in self.problem.bounds),
+            least_intervals=0,
+            idle=(0, 0),
+        )
+        for _ in range(BOUND_STEPS):
+            duration = between(low, high, 0.0)
+            try:
+                share = problem.lasting(duration).motion().least_peak / self.peak
+            except OutOfReach:
+                # Not by a spline: that proves nothing of other drives.
+                share = inf
+            if share < 1.0:
+                high = Tried(duration, share)
+                continue
+            low = Tried(duration, share)
+            if share < inf:
+                ruled_out = duration
+        return ruled_out
 
     def next_duration(self, peak: float) -> float:
         """

@@ -47,7 +47,7 @@ class PeakSolution(NamedTuple):
     multipliers
         Dual values p of the conditions, up to a common factor, shape (r,).
     cap_multipliers
-        Those of the bounded quantities, up to the same factor, shape (s,).
+        Those of the bounded quantities, up to the same factor, none negative, shape (s,).
 
     """
 
@@ -68,7 +68,7 @@ class PeakProgramme:
     target
         b, what they have to add for a peak of 1, shape (r,).
     caps
-        C, quantities that are bounded in magnitude, shape (s, size).
+        C, quantities that are bounded from above, shape (s, size).
     cap_target
         What each has already for a peak of 1, shape (s,).
     cap_limits
@@ -112,11 +112,12 @@ class PeakProgramme:
         # No drive of peak 1 reaches further: y in these units is at most about 1.
         unit = float(np.max(np.abs(target) / np.abs(rows).sum(axis=1)))
         equations = np.column_stack([rows, -target / unit])
-        inequalities, cap_sizes = self._inequalities(unit)
+        inequalities = np.column_stack([self.caps, (self.cap_target - self.cap_limits) / unit])
+        cap_sizes = np.abs(inequalities).max(axis=1, initial=0.0)
         bounds = [(-1.0, 1.0)] * rows.shape[1] + [(0.0, None)]
         found = linprog(
             -np.eye(rows.shape[1] + 1)[-1],
-            A_ub=inequalities,
+            A_ub=inequalities / cap_sizes[:, None],
             b_ub=np.zeros(len(inequalities)),
             A_eq=equations,
             b_eq=np.zeros(len(rows)),
@@ -137,8 +138,8 @@ class PeakProgramme:
         share[free] += change[:-1]
         least += float(change[-1])
         share += rows.T @ (target * least - rows @ share)
-        above, below = np.split(found.ineqlin.marginals / cap_sizes, 2)
-        return PeakSolution(share / least, found.eqlin.marginals, below - above)
+        of_caps = -found.ineqlin.marginals / cap_sizes
+        return PeakSolution(share / least, found.eqlin.marginals, of_caps)
 
     @property
     def _sizes(self) -> FloatArray:
@@ -149,13 +150,5 @@ class PeakProgramme:
     def proven_peak(self, solution: PeakSolution) -> float:
         """Return the peak below which no coefficients meet the conditions, by dual values."""
         p, of_caps = solution.multipliers, solution.cap_multipliers
-        gain = p @ self.target + of_caps @ self.cap_target - np.abs(of_caps) @ self.cap_limits
+        gain = p @ self.target + of_caps @ (self.cap_target - self.cap_limits)
         return float(gain / np.abs(p @ self.rows - of_caps @ self.caps).sum())
-
-    def _inequalities(self, unit: float) -> tuple[FloatArray, FloatArray]:
-        """Return the bounded quantities as rows of at most zero, and their sizes."""
-        above = np.column_stack([self.caps, (self.cap_target - self.cap_limits) / unit])
-        below = np.column_stack([-self.caps, (-self.cap_target - self.cap_limits) / unit])
-        both = np.concatenate([above, below])
-        sizes = np.abs(both).max(axis=1)
-        return both / sizes[:, None], sizes

@@ -14,10 +14,11 @@
 
 """What a motion of least peak effort is free to do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 from flat_planner_ros.core.arm import InvalidRequest
+from flat_planner_ros.core.insensitive import UncertaintyBox
 
 MIN_INTERVALS = 16
 """Fewest spline intervals of an effort: conditions and steps at both ends leave it room."""
@@ -44,7 +45,11 @@ class PeakSettings:
         motion reaches it.
     insensitive
         Whether small errors of the stiffness and the damping shall leave next to nothing, to
-        first order.
+        first order; from a start in motion those of the stiffness.
+    max_residual
+        Residual that may be left on any arm of the box [rad]; 0 for whatever is left.
+    box
+        What may differ from the model.
 
     """
 
@@ -52,6 +57,8 @@ class PeakSettings:
     effort_rate: float = 0.0
     velocity: float = inf
     insensitive: bool = False
+    max_residual: float = 0.0
+    box: UncertaintyBox = field(default_factory=UncertaintyBox)
 
     def __post_init__(self) -> None:
         """Refuse what no motion could obey."""
@@ -62,10 +69,17 @@ class PeakSettings:
             )
         if not (isfinite(self.effort_rate) and self.effort_rate >= 0.0):
             raise InvalidRequest(f'peak.effort_rate must be 0 or more, got {self.effort_rate:g}')
+        if not (isfinite(self.max_residual) and self.max_residual >= 0.0):
+            raise InvalidRequest(f'peak.max_residual must be 0 or more, got {self.max_residual:g}')
         if not self.velocity > 0.0:
             raise InvalidRequest(f'the largest velocity must be above 0, got {self.velocity:g}')
 
     @property
     def is_homogeneous(self) -> bool:
         """Whether the motion over any distance is the one over 1 rad, scaled."""
-        return self.effort_rate == 0.0 and self.velocity == inf
+        return self.effort_rate == 0.0 and self.velocity == inf and self.max_residual == 0.0
+
+    @property
+    def unbounded(self) -> 'PeakSettings':
+        """Return the same without bounds on more than the peak."""
+        return replace(self, effort_rate=0.0, velocity=inf, max_residual=0.0)

@@ -16,6 +16,7 @@
 
 from math import inf
 
+from flat_planner_ros.core.insensitive import UncertaintyBox
 from flat_planner_ros.core.peak import MAX_INTERVALS, MIN_INTERVALS, PeakSettings
 from flat_planner_ros.core.planning import JointLimits
 from flat_planner_ros.ros.parameters.row import Row, Values
@@ -40,13 +41,23 @@ PEAK_ROWS = [
         'peak.insensitive',
         PeakSettings.insensitive,
         '',
-        'let small errors of stiffness and damping leave next to nothing, from rest to rest',
+        'let small errors of stiffness and damping leave next to nothing; from a start in motion '
+        'those of the stiffness',
+    ),
+    Row(
+        'peak.max_residual',
+        PeakSettings.max_residual,
+        'rad',
+        'residual that may be left on any arm within insensitivity.stiffness, .damping, .inertia '
+        'and .payload',
+        '0 = whatever is left',
+        lower=0.0,
     ),
 ]
 """Parameters of the planner node that concern motions of least peak."""
 
 
-def peak_of(values: Values, limits: JointLimits) -> PeakSettings:
+def peak_of(values: Values, limits: JointLimits, box: UncertaintyBox) -> PeakSettings:
     """
     Return what the parameters ask for.
 
@@ -65,4 +76,6 @@ def peak_of(values: Values, limits: JointLimits) -> PeakSettings:
         effort_rate=values['peak.effort_rate'],
         velocity=velocity,
         insensitive=values['peak.insensitive'],
+        max_residual=values['peak.max_residual'],
+        box=box,
     )

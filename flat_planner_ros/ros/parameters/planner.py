@@ -323,6 +323,7 @@ def build(values: Values) -> PlannerSettings:
     """
     joints, arm = arm_of(values)
     limits = limits_of(values, joints)
+    insensitivity = insensitivity_of(values)
     options = PlanningOptions(
         strategy=Strategy(values['strategy']),
         effort_weight=values.get('weights.effort'),
@@ -332,8 +333,8 @@ def build(values: Values) -> PlannerSettings:
         custom=_custom_cost(values),
         flat_model=FlatModel(values['flat_model']),
         compensate_friction=values['compensate_friction'],
-        insensitivity=insensitivity_of(values),
-        peak=peak_of(values, limits),
+        insensitivity=insensitivity,
+        peak=peak_of(values, limits, insensitivity.box),
         drive=Drive(values['drive']),
     )
     # What admits no motion is refused here and not at the next goal.
