@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bounds on a motion of least peak besides that on its peak, and what dual values prove of them."""
+"""Bounds on a motion of least peak besides that on its peak, and what dual values prove."""
 
 from math import inf, pi
 
