@@ -117,6 +117,13 @@ def test_a_goal_through_the_page_in_a_browser(graph, tmp_path):
         expect(page.locator(JOINT)).to_have_value(re.compile(r'^-6\.28'))
         picture = page.screenshot(path=tmp_path / 'page.png')
         expect(page.locator('#report-level')).to_contain_text('earlier', timeout=patience)
+        # A parameter that is not set may be looked at and left alone.
+        weight = page.locator('[name="weights.r"]')
+        page.select_option('[name=strategy]', 'mixed')
+        weight.fill('1')
+        weight.fill('')
+        expect(page.locator('[name="weights.r"]:invalid')).to_have_count(0)
+        page.click('[data-node=flat_planner] .buttons [type=button]')
         stiffness.fill('nonsense')
         stiffness.press('Enter')
         expect(page.locator('[name="mismatch.stiffness_scale"]:invalid')).to_have_count(1)

@@ -7,6 +7,7 @@ import {picture, save, table} from './export.js';
 import {drawFigures, openFigures, plots} from './figures.js';
 import {handleGestures} from './gestures.js';
 import {GoalForm} from './goal.js';
+import {forgetColours} from './plots.js';
 import {Pull} from './pull.js';
 import {Reports} from './reports.js';
 import {SettingsForm} from './settings.js';
@@ -17,8 +18,7 @@ import {clock} from './words.js';
 
 const STALE = 2000;      // [ms] without a joint state
 const LATE = 100;        // [ms] for which time goes on without any
-const LONG = 60;         // [s] of a window that is drawn less often
-const SLOW = 6;          // frames for one drawing of it
+const REST = 2;          // rest between two drawings of the plots, in terms of what one takes
 const ZOOM = 2;
 const STEP = 0.25;       // share of the window by which a button moves it
 
@@ -74,7 +74,9 @@ $('save-png').onclick = () => {
 
 // ---- drawing
 
-let frames = 0;
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', forgetColours);
+
+let rested = 0;          // [ms] when the plots may be drawn again
 
 function frame() {
   requestAnimationFrame(frame);
@@ -86,8 +88,12 @@ function frame() {
     const newest = Math.max(...streams.map(rows => rows.at(-1)[0]));
     view.follow(Math.min(...streams.map(rows => rows[0][0])), newest + Math.min(silence, LATE) / 1000);
   }
-  frames += 1;
-  if (view.span <= LONG || frames % SLOW === 0) drawFigures(store, view);
+  const begin = performance.now();
+  if (begin >= rested) {
+    drawFigures(store, view);
+    const end = performance.now();
+    rested = end + REST * (end - begin);
+  }
   drawPose();
 }
 

@@ -4,14 +4,21 @@ import {within} from './store.js';
 import {minus} from './words.js';
 
 const GAP = 0.25;      // [s] between two rows that no line bridges
-const PAD = {left: 52, right: 8, top: 6, bottom: 18};
+const PAD = {left: 52, right: 8, second: 48, top: 6, bottom: 18};
 const NARROWING = 0.04;   // share of the way by which a range narrows at each drawing
 const NEAR = 1;           // bounds this near to what is shown, in terms of its range, are shown, too
 const DENSE = 2;          // rows per pixel from which only their extremes are drawn
 
+// Colours of the page by name; asking for one takes longer than drawing a line.
+const colours = new Map();
+
 export function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return colours.get(name);
 }
+
+// Light and dark have other ones.
+export function forgetColours() { colours.clear(); }
 
 // Return a context whose unit is a CSS pixel, with the size of the canvas.
 export function prepared(canvas) {
@@ -43,22 +50,23 @@ export function points({rows, column, factor = 1}, from, to, pixels, gap = GAP) 
   const found = [];
   const bin = rows.length > DENSE * pixels ? (to - from) / pixels : 0;
   let last = -Infinity;
-  let [low, high, until] = [null, null, -Infinity];
+  let until = -Infinity;
+  let low = null;     // the rows with the extremes of a bin
+  let high = null;
+  const pointOf = row => [row[0], row[column] * factor];
   const flush = () => {
-    if (low !== null) found.push(...(low[0] <= high[0] ? [low, high] : [high, low]));
-    [low, high] = [null, null];
+    if (low !== null) found.push(...(low[0] <= high[0] ? [low, high] : [high, low]).map(pointOf));
+    low = high = null;
   };
   for (const row of rows) {
-    const [time, value] = [row[0], row[column]];
-    const is_known = value !== null && value !== undefined;
-    if (!is_known || time - last > gap) { flush(); found.push(null); }
-    last = is_known ? time : -Infinity;
+    const is_known = row[column] !== null && row[column] !== undefined;
+    if (!is_known || row[0] - last > gap) { flush(); found.push(null); }
+    last = is_known ? row[0] : -Infinity;
     if (!is_known) continue;
-    const point = [time, value * factor];
-    if (!bin) { found.push(point); continue; }
-    if (time >= until) { flush(); until = time + bin; }
-    if (low === null || point[1] < low[1]) low = point;
-    if (high === null || point[1] > high[1]) high = point;
+    if (!bin) { found.push(pointOf(row)); continue; }
+    if (row[0] >= until) { flush(); until = row[0] + bin; }
+    if (low === null || row[column] < low[column]) low = row;
+    if (high === null || row[column] > high[column]) high = row;
   }
   flush();
   return found;
@@ -77,7 +85,7 @@ export class Plot {
   draw({from, to, zero = 0, unit = 's', gap = GAP, lines, shaded = null, bounds = [], curves = [], marks = [], cursor = null}) {
     const {context: c, width, height} = prepared(this.canvas);
     if (!width || to <= from) return;
-    const box = {x: PAD.left, y: PAD.top, w: width - PAD.left - (this.second ? 44 : PAD.right), h: height - PAD.top - PAD.bottom};
+    const box = {x: PAD.left, y: PAD.top, w: width - PAD.left - (this.second ? PAD.second : PAD.right), h: height - PAD.top - PAD.bottom};
     const visible = lines.map(line => ({...line, points: points({...line, rows: within(line.rows, from, to)}, from, to, box.w, gap)}));
     const [low, high] = this.limits(visible, bounds);
     const X = t => box.x + (t - from) / (to - from) * box.w;

@@ -53,7 +53,11 @@ export class SettingsForm {
     input.append(...texts.map(text => element('option', text)));
     if (kind === 'truth') input.type = 'checkbox';
     if (kind === 'number') input.inputMode = 'decimal';
-    input.oninput = () => { READERS[kind](input); this.mark(); };
+    input.oninput = () => {
+      // What is as it was is right, also nothing where nothing is set.
+      if (shown(input) === input.dataset.known) input.setCustomValidity(''); else READERS[kind](input);
+      this.mark();
+    };
     label.append(title, input);
     return label;
   }
@@ -66,6 +70,7 @@ export class SettingsForm {
       if (!values) { clear(input); continue; }
       const text = textOf(values[input.name]);
       input.dataset.known = text;
+      if (input.type === 'text') input.placeholder = text === '' ? 'not set' : '';
       if (!is_untouched && !everything) continue;
       if (input.type === 'checkbox') input.checked = values[input.name]; else input.value = text;
       input.setCustomValidity('');
@@ -138,5 +143,6 @@ function textOf(value) {
 function clear(input) {
   if (input.type === 'checkbox') input.checked = false; else input.value = '';
   if (input.tagName === 'SELECT') input.selectedIndex = -1;
+  input.placeholder = '';
   delete input.dataset.known;
 }
