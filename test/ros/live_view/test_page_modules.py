@@ -148,6 +148,20 @@ def test_a_table_has_what_is_shown_and_nothing_where_nothing_is_known(run):
     assert {row[titles.index('residual.position.c [rad]')] for row in rows} == {''}
 
 
+def test_the_verdict_on_a_plan_is_that_on_its_last_motion(run):
+    found = run(
+        "import {Store} from './store.js';",
+        """[[5, 6], [5, 8], [20, 21]].map(([start, end]) => {
+            const store = new Store();
+            const verdict = (state, time) => ({state, values: {start_time: String(1e9 + time)}});
+            store.take({values: {epoch: 1e9, plan: {start, end}, verdicts: [
+                verdict('REJECTED', 7), verdict('ACCEPTED', 7), verdict('ACCEPTED', 5)]}});
+            return store.verdictOfPlan?.values.start_time ?? null;
+        })""",
+    )
+    assert found == ['1000000005', '1000000007', None]
+
+
 def test_dense_rows_keep_their_extremes_and_gaps(run):
     dense, sparse = run(
         "import {points} from './plots.js';",

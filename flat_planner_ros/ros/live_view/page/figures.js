@@ -76,14 +76,8 @@ function residual(store, joints) {
   };
 }
 
-// The verdict on the motion that is shown as the plan.
-export function verdictOfPlan({values: {plan, verdicts = [], epoch}}) {
-  return verdicts.find(({state, values}) =>
-    state === 'ACCEPTED' && plan && Math.abs(Number(values.start_time) - epoch - plan.start) < 1e-3);
-}
-
 function worstOf(store) {
-  return Number(verdictOfPlan(store)?.values.predicted_residual_worst ?? NaN);
+  return Number(store.verdictOfPlan?.values.predicted_residual_worst ?? NaN);
 }
 
 function envelopes({values: {report}}) {

@@ -1,7 +1,7 @@
 // What the nodes say: which are there, their verdicts, what motions are predicted to leave and what they left.
 
 import {$, button, element, setText} from './dom.js';
-import {MILLI, verdictOfPlan} from './figures.js';
+import {MILLI} from './figures.js';
 import {clock, inDegrees, minus, precise, readable} from './words.js';
 
 const AGE = 1e-3;     // [s] from which a motion is another one
@@ -76,7 +76,7 @@ export class Reports {
   // What the verdict on the same motion had predicted.
   predicted({start}) {
     const {plan} = this.store.values;
-    const verdict = verdictOfPlan(this.store);
+    const verdict = this.store.verdictOfPlan;
     if (!verdict || start === null || Math.abs(plan.start - start) > AGE) return [];
     const {predicted_residual: nominal, predicted_residual_worst: worst} = verdict.values;
     if (nominal === undefined) return [];
@@ -110,7 +110,7 @@ function useOf(advice) {
 function measured(values) {
   const ofJoints = (prefix, name) => Object.keys(values).filter(key => key.startsWith(`${prefix}.`))
     .map(key => [`${name}, ${key.slice(prefix.length + 1)}`, values[key]]);
-  const beside = expected => expected === undefined ? '' : ` (model ${precise(expected, 4)})`;
+  const beside = expected => expected === undefined ? '' : ` (model ${precise(expected, 3)})`;
   return [
     ['frequency', values.frequency, 1, 'Hz', beside(values.frequency_expected)],
     ['damping ratio', values.damping_ratio, 1, '', beside(values.damping_expected)],
@@ -121,7 +121,7 @@ function measured(values) {
     ['stiffness', values.stiffness_estimate, 1, 'N m/rad', spread(values.stiffness_std)],
     ['damping', values.damping_estimate, 1, 'N m s/rad', spread(values.damping_std)],
   ].filter(row => row[1] !== undefined)
-    .map(([name, value, factor, unit, remark = '']) => [name, minus(`${precise(factor * value, 4)} ${unit}`) + remark]);
+    .map(([name, value, factor, unit, remark = '']) => [name, minus(`${precise(factor * value, 3)} ${unit}`) + remark]);
 }
 
 function spread(deviation) {

@@ -2,6 +2,7 @@
 
 const KEPT = 600;     // [s] of a stream that are kept
 const SPARE = 1000;   // rows beyond them before they are thrown away
+const SAME = 1e-3;    // [s] within which two times are the same
 
 export class Store {
   constructor() {
@@ -18,6 +19,15 @@ export class Store {
   get joints() { return this.values.joints ?? []; }
 
   get actuated() { return this.joints.slice(0, -1); }
+
+  // The verdict on the motion that the plan ends with: a goal in motion continues the plan of the one before.
+  get verdictOfPlan() {
+    const {plan, verdicts = [], epoch} = this.values;
+    return plan && verdicts.find(({state, values}) => {
+      const start = Number(values.start_time) - epoch;
+      return state === 'ACCEPTED' && start > plan.start - SAME && start < plan.end - SAME;
+    });
+  }
 
   forget() { this.streams = {}; }
 
