@@ -56,7 +56,7 @@ fuzz: export FUZZ_CASES ?= 100000
 fuzz: export TRUTH_CASES ?= 1000
 fuzz: export RANDOM_MESSAGES ?= 10000
 fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
-	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/ros/wire/test_random_messages.py test/core $(ARGS)
+	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/core test/ros/wire test/ros/graph/test_controller_conformance.py $(ARGS)
 
 soak: export PYTHONUNBUFFERED := 1
 soak: install  ## random motions with faults for a long time, MINUTES=30 by default

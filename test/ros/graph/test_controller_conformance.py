@@ -28,6 +28,7 @@ from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.wire import stamps
 import numpy as np
 import pytest
+from random_cases import cases
 from ros.rig import goal
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
@@ -37,7 +38,7 @@ import yaml
 
 CONFIG = Path(__file__).resolve().parents[3] / 'config'
 CONTROL = CONFIG / 'ros2_control'
-GOALS = 25
+GOALS = cases(25)
 """Random goals per strategy and form of the command."""
 
 FORMS = {
@@ -147,7 +148,7 @@ def test_commands_of_every_shipped_arm_are_played(graph, file):
 def test_goals_in_motion_and_stops_give_commands_that_the_controller_plays(graph, form):
     player, session = controller(form), Session(graph, **FORMS[form])
     rng = np.random.default_rng(len(form))
-    for _ in range(GOALS // 5):
+    for _ in range(cases(5, 2)):
         session.command(rng.uniform(-3.0, 3.0), 2.0)
         session.advance(rng.uniform(0.3, 1.5))
         assert broken(player, *session.command(rng.uniform(-3.0, 3.0), 2.0)) == []

@@ -15,6 +15,7 @@
 """One grammar for all programs: versions, joints, outputs, standard output, completion."""
 
 import csv
+from importlib import import_module
 import io
 import json
 from pathlib import Path
@@ -102,11 +103,16 @@ def test_two_outputs_cannot_share_standard_output(capsys):
     ],
 )
 @pytest.mark.parametrize('figure', ['folder.png', 'name', 'name.txt'])
-def test_a_name_that_is_no_figure_is_refused(name, arguments, figure, tmp_path):
+def test_a_name_that_is_no_figure_is_refused(
+    name, arguments, figure, tmp_path, monkeypatch, capsys
+):
     (tmp_path / 'folder.png').mkdir()
-    answer = run(name, *arguments, '--plot', figure, cwd=tmp_path)
-    assert answer.returncode == 2
-    assert f"'{figure}' is no file name that ends in .png, .pdf, .svg" in answer.stderr.decode()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, 'argv', [name, *arguments, '--plot', figure])
+    with pytest.raises(SystemExit) as ended:
+        import_module(f'flat_planner_ros.ros.programs.{name}').main()
+    assert ended.value.code == 2
+    assert f"'{figure}' is no file name that ends in .png, .pdf, .svg" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ['folder.png']
 
 

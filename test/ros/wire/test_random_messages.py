@@ -15,8 +15,8 @@
 """
 Random messages on real topics: every goal gets one verdict, and nothing breaks a node.
 
-`make fuzz` sends 10,000 of each kind (RANDOM_MESSAGES); with the other tests it is 500 goals and
-200 of the rest.
+`make fuzz` sends 10,000 of each kind (RANDOM_MESSAGES); with the other tests it is 150 goals and
+60 of the rest.
 """
 
 from collections import Counter
@@ -38,6 +38,7 @@ from hypothesis import given, HealthCheck, Phase, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from random_cases import cases
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -215,7 +216,7 @@ class Goals(Planner):
 def test_every_random_goal_gets_one_verdict(graph):
     goals = Goals(graph)
 
-    @random_messages(500)
+    @random_messages(150)
     @given(st.one_of(trajectories(effort=False), trajectories(effort=False), plain_goals()))
     def send(message):
         session = goals.node._session
@@ -261,7 +262,7 @@ def test_goals_leave_no_memory_behind(graph):
 
     send(300)
     before = memory()
-    send(1000)
+    send(cases(1000, 2))
     assert memory() - before < GROWTH
 
 
@@ -271,7 +272,7 @@ def test_random_joint_states_harm_no_node(graph):
     assert goals.send(goal(1.0, 60.0))['state'] == 'ACCEPTED'
     track = goals.node._session.track(0.0)
 
-    @random_messages(200)
+    @random_messages(60)
     @given(joint_states())
     def send(message):
         graph.publish('/joint_states', message, readers=2)
@@ -290,7 +291,7 @@ def test_random_trajectories_and_efforts_never_drive_the_plant_mad(graph):
         for topic in ('/joint_states', '/stream/joint_states')
     ]
 
-    @random_messages(200)
+    @random_messages(60)
     @given(trajectories(effort=True), st.lists(numbers, max_size=3))
     def send(message, efforts):
         graph.publish('/flat_planner/joint_trajectory', message)
@@ -324,7 +325,7 @@ def test_random_parameters_are_refused_or_consistent(graph, node_class, rows):
         st.sampled_from([choice for row in rows for choice in row.choices]),
     )
 
-    @random_messages(200)
+    @random_messages(60)
     @given(st.sampled_from(names), values)
     def change(name, value):
         before = node._configuration.settings
@@ -360,7 +361,7 @@ def test_random_requests_are_answered(graph):
     def ask(kind, service, **fields):
         return graph.call(kind, f'/flat_planner/{service}', kind.Request(**fields))
 
-    @random_messages(100)
+    @random_messages(40)
     @given(lists, words, st.integers(0, 2**64 - 1))
     def send(parameters, texts, depth):
         results = ask(SetParameters, 'set_parameters', parameters=parameters).results
