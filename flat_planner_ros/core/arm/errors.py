@@ -119,7 +119,7 @@ class UncertifiedLoop(FlatPlannerError):
         found = f'its margin is {margin:.3g}' if decay_rate > 0.0 else 'it is unstable'
         super().__init__(
             f'loop refused: with stiffness, damping and inertia times {k:g}, {c:g} and '
-            f'{inertia:g} {found} (slowest decay {decay_rate:.3g} 1/s), at least {bound:g} is '
+            f'{inertia:g} {found} (slowest decay {decay_rate:.3g} 1/s); a margin of {bound:g} is '
             'asked for; lower bandwidth, delay or uncertainty, or raise rate'
         )
         self.margin = margin

@@ -79,11 +79,18 @@ def read_settings(
         The values are no valid settings.
 
     """
-    given = {} if path is None else _from_file(Path(path), '/' + node.strip('/'))
+    name = '/' + node.strip('/')
+    given = {} if path is None else _from_file(Path(path), name)
+    for doubt in () if path is None else _missed(Path(path), name):
+        warn(doubt)
     for override in overrides:
         name, separator, text = override.partition(ASSIGNMENT)
         if not (separator and name and text):
-            raise InvalidParameter(f'an override is written name:=value, got {override!r}')
+            meant = f'; did you mean {override.replace("=", ASSIGNMENT, 1)}?'
+            raise InvalidParameter(
+                f'an override is written name:=value, got {override!r}'
+                f'{meant if "=" in override and not separator else ""}'
+            )
         given[name] = parsed(text, f'the value of {name}')
     refuse_unknown(given, [row.name for row in rows], warn)
     defaults = model_defaults(given)
@@ -118,6 +125,24 @@ def block_names(path: Path) -> list[str]:
 def reaches(pattern: str, node: str) -> bool:
     """Return whether a block is for a node, whose name has its namespace."""
     return re.fullmatch(_expression(pattern), node) is not None
+
+
+def _missed(path: Path, node: str) -> Iterator[str]:
+    """Return blocks that were likely meant for a node but do not reach it; or that none does."""
+    blocks = block_names(path)
+    base = node.rpartition('/')[2]
+    missed = [block for block in blocks if not reaches(block, node)]
+    for block in missed:
+        other = block.rpartition('/')[2]
+        is_meant = other == base or (base.endswith(other) and other != base)
+        if is_meant and not any(reaches(one, node) for one in blocks if base in one):
+            yield (
+                f'{path}: the block {block} is not for {node}, its values have no effect; did you '
+                f'mean {node}, or /**/{base} for any namespace?'
+            )
+            return
+    if len(missed) == len(blocks):
+        yield f'{path}: no block is for {node}, only {", ".join(blocks)}; it has no effect'
 
 
 def _from_file(path: Path, node: str) -> dict[str, Any]:

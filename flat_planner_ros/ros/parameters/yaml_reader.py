@@ -97,5 +97,5 @@ def parsed(text: str, source: str) -> Any:
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
-        reason = ' '.join(str(error).split())
+        reason = ' '.join(str(error).replace('in "<unicode string>", ', 'in ').split())
         raise InvalidParameter(f'{source} is not valid YAML: {reason}') from error

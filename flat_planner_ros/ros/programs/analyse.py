@@ -34,8 +34,10 @@ from flat_planner_ros.ros.programs.command_line import (
     figure_name,
     missing_for_plot,
     parsed,
+    seconds,
 )
 from flat_planner_ros.ros.programs.outputs import (
+    check_writable,
     NotWritten,
     open_text,
     STANDARD_OUTPUT,
@@ -100,6 +102,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return explain_missing(error, 'record')
     recording = None
     try:
+        check_writable(options.json, options.plot)
         with progress(len(storage_files(options.file)), 'analyse') as advance:
             recording = Recording(options.file, advance)
             sources = find_sources(
@@ -159,7 +162,7 @@ def _parser() -> ArgumentParser:
     )
     parser.add_argument('--joint-states', default='', metavar='TOPIC', help='measured JointState')
     parser.add_argument(
-        '--window', type=float, metavar='S', help='time after a motion that is judged [s]'
+        '--window', type=seconds, metavar='S', help='time after a motion that is judged [s]'
     )
     return parser
 
@@ -173,7 +176,8 @@ def _settings(
     if options.params_file is not None:
         node = f'{options.namespace.strip("/")}/{interfaces.MONITOR}'
         rows, build = monitor_parameters.ROWS, monitor_parameters.build
-        known = [(0, read_settings(options.params_file, rows, build, node=node))]
+        warn = partial(print, 'analyse:', file=sys.stderr)
+        known = [(0, read_settings(options.params_file, rows, build, node=node, warn=warn))]
     else:
         known = recorded_settings(recording, sources) or [(0, MonitorSettings())]
     if options.window is not None:

@@ -22,6 +22,7 @@ standard output, wherever they occur.
 from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
+from math import inf, nan
 import os
 from pathlib import Path
 import sys
@@ -53,7 +54,8 @@ def parsed(
     args
         Command line without the program's name; the process's own by default.
     outputs
-        Names of the options that name outputs, of which one may be `-`.
+        Names of the options that name outputs, of which one may be `-`. No two of them are one
+        file, and none is a file that is read.
 
     """
     parser.add_argument('--version', action='version', version=version_line())
@@ -63,9 +65,46 @@ def parsed(
 
         autocomplete(parser)
     options = parser.parse_args(args)
-    if [getattr(options, name) for name in outputs].count(STANDARD_OUTPUT) > 1:
+    written = [str(getattr(options, name)) for name in outputs if getattr(options, name)]
+    if written.count(STANDARD_OUTPUT) > 1:
         parser.error('only one output can be -, standard output')
+    files = [Path(name).absolute() for name in written if name != STANDARD_OUTPUT]
+    for index, path in enumerate(files):
+        if path in files[:index]:
+            parser.error(f'two outputs would be one file, {path}')
+        if path in _inputs(options):
+            parser.error(f'{path} is read, and would be overwritten')
     return options
+
+
+def _inputs(options: Namespace) -> list[Path]:
+    """Return the files that are read, by the names that their options have in all programs."""
+    given = [getattr(options, name, None) for name in ('params_file', 'file', 'files')]
+    listed = [
+        name for each in given if each for name in (each if isinstance(each, list) else [each])
+    ]
+    return [Path(name).absolute() for name in listed]
+
+
+def number_above_zero(text: str) -> float:
+    """Return a number above 0."""
+    return _above_zero(text, 'number above 0, e.g. 1.5')
+
+
+def seconds(text: str) -> float:
+    """Return a time above 0 [s]."""
+    return _above_zero(text, 'time above 0 in seconds, e.g. 1.5')
+
+
+def _above_zero(text: str, what: str) -> float:
+    """Return a finite number above 0; else say what is wanted."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = nan
+    if not 0.0 < number < inf:
+        raise ArgumentTypeError(f'{text!r} is no {what}')
+    return number
 
 
 class JointAngles(Action):

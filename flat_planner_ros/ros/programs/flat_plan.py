@@ -25,7 +25,7 @@ from time import perf_counter
 from typing import TextIO
 
 from flat_planner_ros.core.arm import FlatPlannerError
-from flat_planner_ros.core.planning import RequestRejected
+from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import (
     Goal,
     GoalPoint,
@@ -35,7 +35,8 @@ from flat_planner_ros.core.session import (
     StartSource,
     Track,
 )
-from flat_planner_ros.ros.parameters.parameter_file import read_settings
+from flat_planner_ros.ros.parameters.idle import idle_parameters
+from flat_planner_ros.ros.parameters.parameter_file import ASSIGNMENT, read_settings
 from flat_planner_ros.ros.parameters.planner import build, ROWS
 from flat_planner_ros.ros.programs.angles import FORMS
 from flat_planner_ros.ros.programs.command_line import (
@@ -47,10 +48,16 @@ from flat_planner_ros.ros.programs.command_line import (
     missing_for_plot,
     parsed,
     pose_of,
+    seconds,
 )
-from flat_planner_ros.ros.programs.outputs import open_text, summary_stream, write_through
+from flat_planner_ros.ros.programs.outputs import (
+    check_writable,
+    open_text,
+    summary_stream,
+    write_through,
+)
 from flat_planner_ros.ros.wire import diagnostics, interfaces
-from flat_planner_ros.ros.wire.verdict_text import unit_of
+from flat_planner_ros.ros.wire.verdict_text import told, unit_of
 
 EXAMPLES = """
 examples:
@@ -93,6 +100,7 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f'flat_plan: {missing}', file=sys.stderr)
         return 1
     try:
+        check_writable(options.csv, options.json, options.plot)
         settings = read_settings(
             options.params_file,
             ROWS,
@@ -101,6 +109,9 @@ def main(args: Sequence[str] | None = None) -> int:
             overrides=options.parameter,
             warn=lambda text: print(f'flat_plan: {text}', file=sys.stderr),
         )
+        names = [text.partition(ASSIGNMENT)[0] for text in options.parameter]
+        for remark in idle_parameters(names, settings.session.options.strategy):
+            print(f'flat_plan: {remark}', file=sys.stderr)
         session, goal = _task(settings.session, options)
         started = perf_counter()
         motion = session.submit(goal, NOW)
@@ -109,13 +120,15 @@ def main(args: Sequence[str] | None = None) -> int:
         joints = settings.session.joints
         status = diagnostics.accepted_status(motion, goal, joints, elapsed)
         values = {pair.key: pair.value for pair in status.values}
-        for remark in motion.remarks:
+        for remark in told(motion):
             print(f'flat_plan: {remark}', file=sys.stderr)
         _print_summary(motion, values, summary_stream(options.csv, options.json, options.plot))
         _write(options, joints, track, values)
     except RequestRejected as error:
         code = interfaces.ERROR_CODES[error.reason]
-        print(f'flat_plan: {error.reason.value} ({code}): {error}', file=sys.stderr)
+        hint = '; here: --duration' if options.duration == 0.0 and error.value is None else ''
+        hint = hint if error.reason is Reason.DURATION_OUT_OF_RANGE else ''
+        print(f'flat_plan: {error.reason.value} ({code}): {error}{hint}', file=sys.stderr)
         return 1
     except FlatPlannerError as error:
         print(f'flat_plan: {error}', file=sys.stderr)
@@ -144,7 +157,7 @@ def _parser() -> ArgumentParser:
     )
     parser.add_argument(
         '--duration',
-        type=float,
+        type=seconds,
         default=0.0,
         metavar='S',
         help='of the motion [s]; without it, as the parameters say (duration.default, limits)',
@@ -164,7 +177,7 @@ def _parser() -> ArgumentParser:
         default=[],
         type=_via,
         metavar='JOINT=RAD[,JOINT=RAD…][@S]',
-        help='point to pass, at a time unless the planner is to choose; may be repeated',
+        help='point to pass, at a time, or all points where the planner chooses; may be repeated',
     )
     parser.add_argument('--params-file', metavar='FILE', help="default: the paper's arm")
     parser.add_argument(
@@ -201,6 +214,15 @@ def _via(text: str) -> tuple[dict[str, float], float]:
 
 def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession, Goal]:
     """Return a planner at rest at the start, and the goal."""
+    times = [*(time for _, time in options.via), options.duration]
+    if options.via and any(times[:-1]) != all(times):
+        raise FlatPlannerError(
+            'give every --via a time, as joint1=0.5@0.8, and --duration; or no --via a time'
+        )
+    if options.via and not any(times[:-1]):
+        # The planner chooses when the points are passed; that is asked for without any time.
+        settings = replace(settings, default_duration=times[-1] or settings.default_duration)
+        times[-1] = 0.0
     angles = pose_of(options.start, settings.joints, '--start')
     start = dict(zip(settings.joints, angles.tolist(), strict=True))
     session = PlannerSession(
@@ -215,7 +237,6 @@ def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession
     for changes in [*(pose for pose, _ in options.via), options.goal]:
         poses.append({**poses[-1], **changes})
     names = tuple(poses[-1])
-    times = [*(time for _, time in options.via), options.duration]
     points = [
         GoalPoint(time=time, positions=tuple(pose.get(name, 0.0) for name in names))
         for pose, time in zip(poses[1:], times, strict=True)

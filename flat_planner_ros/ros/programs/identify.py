@@ -31,7 +31,7 @@ from flat_planner_ros.ros.programs.command_line import (
     missing_for_plot,
     parsed,
 )
-from flat_planner_ros.ros.programs.outputs import summary_stream, write_through
+from flat_planner_ros.ros.programs.outputs import check_writable, summary_stream, write_through
 from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.wire import interfaces
 
@@ -57,8 +57,13 @@ def main(args: Sequence[str] | None = None) -> int:
         return explain_missing(error, 'record')
     node = f'{options.namespace.strip("/")}/{interfaces.PLANNER}'
     try:
+        check_writable(options.output, options.plot)
         settings = read_settings(
-            options.params_file, planner_parameters.ROWS, planner_parameters.build, node=node
+            options.params_file,
+            planner_parameters.ROWS,
+            planner_parameters.build,
+            node=node,
+            warn=lambda text: print(f'identify: {text}', file=sys.stderr),
         ).session
         with progress(len(options.files), 'identify') as advance:
             found = measured(

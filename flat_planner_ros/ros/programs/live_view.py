@@ -14,7 +14,7 @@
 
 """Live view: the arm, its motions and their residuals in a web browser."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Sequence
 from ipaddress import ip_address
 import os
@@ -26,6 +26,7 @@ from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.programs.command_line import explain_missing, parsed, split_arguments
 
 HOST, PORT = '127.0.0.1', 8765
+MAX_PORT = 65535
 """Address of the page by default: for browsers of this machine only."""
 
 
@@ -110,10 +111,9 @@ def _parser() -> ArgumentParser:
 
 def _port(text: str) -> int:
     """Return a port."""
-    port = int(text)
-    if not 0 <= port <= 65535:
-        raise ValueError(text)
-    return port
+    if not (text.isdecimal() and int(text) <= MAX_PORT):
+        raise ArgumentTypeError(f'{text!r} is no port, 0 to {MAX_PORT}')
+    return int(text)
 
 
 if __name__ == '__main__':

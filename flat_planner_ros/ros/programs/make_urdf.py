@@ -26,13 +26,14 @@ from flat_planner_ros.ros.programs.robot_description import read_drive, read_urd
 
 def main(args: Sequence[str] | None = None) -> int:
     """Write the URDF; 0 if it could be made, 1 if the parameters are no arm."""
-    options = parsed(_parser(), args)
+    options = _options(args)
     try:
         urdf = read_urdf(
             options.params_file,
             namespace=options.namespace,
             drawn_length=options.drawn_length,
             control=_control(options),
+            warn=lambda text: print(f'make_urdf: {text}', file=sys.stderr),
         )
         with open_text(options.output) as file:
             file.write(urdf)
@@ -43,6 +44,24 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f'make_urdf: {explain_os(error)}', file=sys.stderr)
         return 1
     return 0
+
+
+def _options(args: Sequence[str] | None) -> Namespace:
+    """Return the command line's options; one that would have no effect is an error."""
+    parser = _parser()
+    options = parsed(parser, args, ['output'])
+    plugin = options.ros2_control
+    for name in ('command_interface', 'hardware_param', 'controllers'):
+        if plugin is None and getattr(options, name):
+            parser.error(f'--{name.replace("_", "-")} needs --ros2-control')
+    if plugin is not None and plugin not in PLUGINS and not {'/', ':'} & set(plugin):
+        parser.error(
+            f'--ros2-control {plugin!r} is none of {", ".join(PLUGINS)}, nor a full name such as '
+            f'my_robot/Driver'
+        )
+    if plugin == 'gz' and not options.controllers:
+        parser.error('--ros2-control gz needs --controllers FILE: Gazebo starts them')
+    return options
 
 
 def _parser() -> ArgumentParser:

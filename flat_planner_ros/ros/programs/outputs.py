@@ -16,6 +16,8 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from errno import EISDIR, ENOENT
+from os import strerror
 from pathlib import Path
 import sys
 from tempfile import TemporaryDirectory
@@ -29,6 +31,25 @@ STANDARD_OUTPUT = '-'
 
 class NotWritten(FlatPlannerError):
     """An output cannot be written; the message says which and why."""
+
+
+def check_writable(*names: str | Path | None) -> None:
+    """
+    Refuse outputs that could not be written, before there is anything to write.
+
+    Raises
+    ------
+    NotWritten
+        There is no such folder, or a folder of this name.
+
+    """
+    for name in names:
+        if name is None or name == STANDARD_OUTPUT:
+            continue
+        path = Path(name)
+        if path.is_dir() or not path.parent.is_dir():
+            number = EISDIR if path.is_dir() else ENOENT
+            raise NotWritten(f'cannot write {name}: {strerror(number)}')
 
 
 def summary_stream(*outputs: str | None) -> TextIO:

@@ -14,7 +14,7 @@
 
 """The arm of a parameter file as a URDF, the same for robots, simulators and visualisation."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
 
@@ -48,6 +48,7 @@ def read_urdf(
     namespace: str = '',
     drawn_length: float | None = None,
     control: ControlBlock | None = None,
+    warn: Callable[[str], object] = lambda text: None,
 ) -> str:
     """
     Return the URDF of the arm that a planner started with a file plans for.
@@ -62,6 +63,8 @@ def read_urdf(
         Length of link n-1 of an arm in reduced form, which does not tell it [m].
     control
         Adds a block for ros2_control.
+    warn
+        Is told of what the file has in vain.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def read_urdf(
         return description_of(values, drawn_length=drawn_length)
 
     node = f'{namespace}/{interfaces.PLANNER}'
-    return urdf_of(read_settings(params_file, ROWS, build, node=node), control)
+    return urdf_of(read_settings(params_file, ROWS, build, node=node, warn=warn), control)
 
 
 def read_drive(params_file: Path | str | None, *, namespace: str = '') -> str:

@@ -43,10 +43,17 @@ from flat_planner_ros.ros.programs.command_line import (
     joint_angle,
     JointAngles,
     missing_for_plot,
+    number_above_zero,
     parsed,
     pose_of,
+    seconds,
 )
-from flat_planner_ros.ros.programs.outputs import open_text, summary_stream, write_through
+from flat_planner_ros.ros.programs.outputs import (
+    check_writable,
+    open_text,
+    summary_stream,
+    write_through,
+)
 from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.wire import interfaces
 
@@ -73,6 +80,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     options = _options(args)
     try:
+        check_writable(options.csv, options.plot)
         points, fastest, box = _points(options)
         with redirect_stdout(summary_stream(options.csv, options.plot)):
             _print(points, box)
@@ -136,17 +144,19 @@ def _options(args: Sequence[str] | None) -> Namespace:
     parser.add_argument(
         '--namespace', default='', help="of the planner, for files with a namespace's blocks"
     )
-    parser.add_argument('--duration', metavar='S', type=float, required=True, help='of the motion')
+    parser.add_argument(
+        '--duration', metavar='S', type=seconds, required=True, help='of the motion'
+    )
     parser.add_argument(
         '--max-effort',
         metavar='N_M',
-        type=float,
+        type=number_above_zero,
         help='also print the shortest motion of each strategy within this effort',
     )
     parser.add_argument(
         '--stretch',
         metavar='RATIO',
-        type=float,
+        type=number_above_zero,
         nargs='+',
         default=STRETCHES,
         help='durations of the sweeps over that of the motion (default: 1 1.1 1.25 1.5)',
@@ -174,11 +184,11 @@ def _points(
         warn=lambda text: print(f'tradeoff: {text}', file=sys.stderr),
     ).session
     arm, planning = settings.arm, settings.options
-    request = MotionRequest(
-        start=pose_of(options.start, settings.joints, '--start'),
-        final=pose_of({**options.start, **options.goal}, settings.joints, 'goal'),
-        duration=options.duration,
-    )
+    start = pose_of(options.start, settings.joints, '--start')
+    final = pose_of({**options.start, **options.goal}, settings.joints, 'goal')
+    if (start == final).all():
+        raise FlatPlannerError('the goal is where the arm starts: there is nothing to compare')
+    request = MotionRequest(start=start, final=final, duration=options.duration)
     wanted = PlanningOptions(
         effort_weight=planning.effort_weight,
         energy_weight=planning.energy_weight,

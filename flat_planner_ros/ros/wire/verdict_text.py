@@ -53,14 +53,19 @@ def unit_of(key: str) -> str:
     return next((UNITS[part] for part in key.split('.') if part in UNITS), '')
 
 
-def clauses(motion: Motion) -> str:
-    """Return what there is to say of an accepted motion, each clause after a semicolon."""
-    told = list(motion.remarks)
+def told(motion: Motion) -> list[str]:
+    """Return what there is to say of an accepted motion, as clauses."""
+    found = list(motion.remarks)
     if _stands_still(motion):
-        told.insert(0, 'the arm is there already')
+        found.insert(0, 'the arm is there already')
     if motion.duration_factor > 1.0:
-        told.insert(0, f'up to {motion.duration_factor:g} times the shortest (duration.factor)')
-    return ''.join(f'; {clause}' for clause in told)
+        found.insert(0, f'up to {motion.duration_factor:g} times the shortest (duration.factor)')
+    return found
+
+
+def clauses(motion: Motion) -> str:
+    """Return the same, each clause after a semicolon."""
+    return ''.join(f'; {clause}' for clause in told(motion))
 
 
 def values_of(status: Any) -> dict[str, str]:
