@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from flat_planner_ros.core.arm import FloatArray, PlanarArm
+from flat_planner_ros.core.model_fit.imbalance import ImbalanceEstimate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +88,8 @@ class ModelFit:
         Standard deviation of the sensors' noise in both, shape (2,) [rad].
     misfit
         What the model does not explain; empty if noise explains the residuals.
+    imbalance
+        Of the last link; None where it was not looked for, or nothing tells it.
 
     """
 
@@ -98,6 +101,7 @@ class ModelFit:
     residual_rms: FloatArray
     noise: FloatArray
     misfit: str
+    imbalance: ImbalanceEstimate | None = None
 
     def estimate(self, name: str) -> ParameterEstimate:
         """Return the estimate with a name; raise KeyError if there is none."""
@@ -114,7 +118,8 @@ class ModelFit:
         )
         verdict = f'the model does not explain the motion: {self.misfit}' if self.misfit else ''
         scale = f'true efforts are {self.effort_scale:.6g} times those measured'
-        lines = [estimate.text for estimate in self.estimates] + [left, verdict]
+        unbalanced = '' if self.imbalance is None else self.imbalance.text
+        lines = [estimate.text for estimate in self.estimates] + [unbalanced, left, verdict]
         if self.effort_scale != 1.0:
             lines.insert(0, scale)
         return '\n'.join(filter(None, lines))

@@ -20,6 +20,7 @@ from math import inf, pi, sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
+from flat_planner_ros.core.model_fit.imbalance import find_imbalance
 from flat_planner_ros.core.model_fit.judgement import covariance, doubt
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
@@ -109,7 +110,11 @@ class Trust(Enum):
 
 
 def fit_model(
-    measurements: Measurements, start: PlanarArm, *, trust: Trust = Trust.EFFORT
+    measurements: Measurements,
+    start: PlanarArm,
+    *,
+    trust: Trust = Trust.EFFORT,
+    with_imbalance: bool = False,
 ) -> ModelFit:
     """
     Fit the model of a flat arm to measured angles and efforts.
@@ -125,6 +130,8 @@ def fit_model(
         The arm as believed; what the motion does not tell stays as it is there.
     trust
         What sets the scale.
+    with_imbalance
+        Whether to look for an imbalance of the last link, too.
 
     Returns
     -------
@@ -149,8 +156,12 @@ def fit_model(
     found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
     found, observed, other = _interpolated(observed, found, scales)
     found, free = _told(observed, found, scales, believed)
+    imbalance = None
+    if with_imbalance:
+        imbalance, found = find_imbalance(observed, found, free, scales)
     errors = _errors(observed, other, found, free, scales)
-    return _result(measurements, start, observed, found, free, errors, trust)
+    result = _result(measurements, start, observed, found, free, errors, trust)
+    return replace(result, imbalance=imbalance)
 
 
 def _observed(measurements: Measurements, period: float) -> Observed:
@@ -320,7 +331,7 @@ def _result(
     trust: Trust,
 ) -> ModelFit:
     """Put numbers into words."""
-    believed, values = _vector(start), found.parameters
+    believed, values = _vector(start), found.parameters[: len(NAMES)]
     scale = 1.0
     if trust is Trust.INERTIA and BOTH in free:
         scale = float(believed[BOTH] / values[BOTH])

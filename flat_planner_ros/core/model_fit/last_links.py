@@ -44,6 +44,9 @@ NAMES = (
 
 BOTH, LAST, STIFFNESS, DAMPING, VISCOUS, COULOMB, OFFSET, DELAY = range(len(NAMES))
 
+IMBALANCE = len(NAMES)
+"""Place of the coupling of both links behind these, in vectors that have one [kg m^2]."""
+
 STATES = 4
 """Angles of link n-1 and of the passive joint, and their rates."""
 
@@ -142,18 +145,24 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
 
 def _linear_flow(models: FloatArray, step: float) -> _Flow:
     """Return how states and forces act on the state a step later."""
-    link = models[:, BOTH] - models[:, LAST]
+    link, last = models[:, BOTH] - models[:, LAST], models[:, LAST]
+    coupling = models[:, IMBALANCE] if models.shape[1] > IMBALANCE else np.zeros(len(models))
+    # Of the inverse of the mass matrix: what a force on link n-1 and one between both links do.
+    by_force = last / (link * last - coupling**2)
+    between = (last + coupling) / (link * last - coupling**2)
+    relative = (link + last + 2.0 * coupling) / (link * last - coupling**2)
     count = len(models)
     # The force and its first two derivatives are states of their own: one exponential for all.
     augmented = np.zeros((count, STATES + 3, STATES + 3))
     augmented[:, 0, 2] = augmented[:, 1, 3] = 1.0
-    augmented[:, 2, 1] = models[:, STIFFNESS] / link
-    augmented[:, 2, 2] = -models[:, VISCOUS] / link
-    augmented[:, 2, 3] = models[:, DAMPING] / link
-    augmented[:, 2, 4] = 1.0 / link
-    augmented[:, 3] = -augmented[:, 2]
-    augmented[:, 3, 1] -= models[:, STIFFNESS] / models[:, LAST]
-    augmented[:, 3, 3] -= models[:, DAMPING] / models[:, LAST]
+    augmented[:, 2, 1] = models[:, STIFFNESS] * between
+    augmented[:, 2, 2] = -models[:, VISCOUS] * by_force
+    augmented[:, 2, 3] = models[:, DAMPING] * between
+    augmented[:, 2, 4] = by_force
+    augmented[:, 3, 1] = -models[:, STIFFNESS] * relative
+    augmented[:, 3, 2] = models[:, VISCOUS] * between
+    augmented[:, 3, 3] = -models[:, DAMPING] * relative
+    augmented[:, 3, 4] = -between
     augmented[:, 4, 5] = augmented[:, 5, 6] = 1.0
     flow = _exponential(step * augmented)[:, :STATES]
     value, slope, bend = (flow[:, :, j] for j in (4, 5, 6))

@@ -73,7 +73,7 @@ def main(args: Sequence[str] | None = None) -> int:
                 topic=options.joint_states,
                 advance=advance,
             )
-        fit = fit_model(found, settings.arm, trust=Trust(options.trust))
+        fit = fit_model(found, settings.arm, trust=Trust(options.trust), with_imbalance=True)
         print(fit.text, file=summary_stream(options.output, options.plot))
         if options.plot is not None:
             # Imported here: matplotlib is an extra.

@@ -153,7 +153,7 @@ def test_another_structure_is_noticed(spring):
     assert fit.misfit in fit.text
 
 
-def test_an_imbalance_is_noticed():
+def test_an_imbalance_is_noticed_and_found():
     links = {
         'link_length': [0.1, 0.1],
         'link_mass': [0.05, 0.02],
@@ -170,10 +170,17 @@ def test_an_imbalance_is_noticed():
     off = displaced_com(com, links['link_mass'], [0.0, moment])
     arms = believed, PlanarArm.from_links(link_com=off, **links)
     balanced, unbalanced = (
-        fit_model(recorded(arm, believed, noise=1e-5, **SHORT), believed) for arm in arms
+        fit_model(recorded(arm, believed, noise=1e-5, **SHORT), believed, with_imbalance=True)
+        for arm in arms
     )
     assert balanced.misfit == ''
     assert unbalanced.misfit != ''
+    assert not balanced.imbalance.is_seen
+    assert 'imbalance of link n: none above' in balanced.text
+    found, coupling = unbalanced.imbalance, arms[1].inertia[0, 1]
+    assert found.is_seen
+    assert 0.5 * coupling < found.coupling < 2.0 * coupling
+    assert 'of its counterbalance larger by' in unbalanced.text
 
 
 def test_more_joints_leave_the_last_two_as_they_are():

@@ -1,0 +1,121 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Imbalance of the last link from the same recording: a coupling that a balanced arm has not."""
+
+from dataclasses import dataclass
+
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.judgement import covariance
+from flat_planner_ros.core.model_fit.last_links import BOTH, IMBALANCE, LAST, STIFFNESS
+from flat_planner_ros.core.model_fit.refinement import Observed, refine, Refined
+import numpy as np
+
+SCALE = 0.1
+"""Size of an imbalance, relative to the inertia of the last link [-]."""
+
+SURE = 3.0
+"""Imbalance over its standard error from which there is one [-]."""
+
+EXPLAINED = 0.7
+"""Sum of squares that an imbalance leaves at most, of that without; other faults leave more [-]."""
+
+NEGLECTED = 1e-3
+"""Smallest imbalance that is said, relative to the inertia: the fit takes angles as small [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImbalanceEstimate:
+    """
+    What the last link lacks of balance.
+
+    Attributes
+    ----------
+    coupling, std
+        l_(n-1) s_n and its standard error [kg m^2].
+    inertia
+        I*_n, to which it is relative [kg m^2].
+    left
+        Sum of squares that is left with it, relative to that without [-].
+
+    """
+
+    coupling: float
+    std: float
+    inertia: float
+    left: float
+
+    @property
+    def is_seen(self) -> bool:
+        """Tell whether there is an imbalance for certain."""
+        is_large = abs(self.coupling) > max(SURE * self.std, NEGLECTED * self.inertia)
+        return is_large and self.left < EXPLAINED
+
+    @property
+    def text(self) -> str:
+        """Return the finding as a line for people."""
+        if not self.is_seen:
+            most = max(SURE * self.std, NEGLECTED * self.inertia)
+            share = 100.0 * most / self.inertia
+            return f'imbalance of link n: none above {most:.2g} kg m^2 ({share:.2g} % of I*_n)'
+        share = 100.0 * self.coupling / self.inertia
+        change = 'larger' if self.coupling > 0.0 else 'smaller'
+        return (
+            f'imbalance of link n: {self.coupling:.4g} ± {self.std:.2g} kg m^2 ({share:.2g} % of '
+            f'I*_n): make mass * arm of its counterbalance {change} by '
+            f'{abs(self.coupling):.4g} kg m^2 over the length of link n-1, and record again: '
+            f'deflections are taken as small, which may be a third off'
+        )
+
+
+def find_imbalance(
+    observed: Observed, found: Refined, free: list[int], scales: FloatArray
+) -> tuple[ImbalanceEstimate | None, Refined]:
+    """
+    Return the imbalance that a recording shows, and the fit with it where there is one.
+
+    Parameters
+    ----------
+    observed, found, free, scales
+        The recording, the fit of a balanced arm, what it tells, and the parameters' scales.
+
+    Returns
+    -------
+    tuple[ImbalanceEstimate | None, Refined]
+        None, and the fit as it was, where inertias or stiffness are not told.
+
+    Notes
+    -----
+    To first order in the deflection the coupling is a constant of the last two rows, (N7) of
+    docs/derivation.md: the mass matrix of both links is not diagonal.
+
+    """
+    if not {BOTH, LAST, STIFFNESS} <= set(free):
+        return None, found
+    last = float(found.parameters[LAST])
+    widened = np.append(scales, SCALE * last)
+    with_it = [*free, IMBALANCE]
+    start = np.append(found.parameters, 0.0)
+    tried = refine(observed, start, with_it, widened, found.spread, found.starts)
+    error = np.sqrt(covariance(tried.around, widened[with_it])[-1, -1]) * widened[-1]
+    estimate = ImbalanceEstimate(
+        coupling=float(tried.parameters[IMBALANCE]),
+        std=float(error),
+        inertia=float(tried.parameters[LAST]),
+        left=tried.around.cost / found.around.cost,
+    )
+    if not estimate.is_seen:
+        return estimate, found
+    fixed = refine(observed, tried.parameters, free, widened, tried.spread, tried.starts)
+    return estimate, fixed
