@@ -29,7 +29,7 @@ SURE = 3.0
 """Imbalance over its standard error from which there is one [-]."""
 
 EXPLAINED = 0.7
-"""Sum of squares that an imbalance leaves at most, of that without; other faults leave more [-]."""
+"""Sum of squares that an imbalance leaves at most, of that without; other faults do more [-]."""
 
 NEGLECTED = 1e-3
 """Smallest imbalance that is said, relative to the inertia: the fit takes angles as small [-]."""
