@@ -58,6 +58,7 @@ WRONG_CALLS = {
         ['joint1=1', '--duration', '1s'],
         "'1s' is no time above 0 in seconds, e.g. 1.5",
     ),
+    'a time below 0': (tradeoff, ['joint1=1', '--duration', '-1'], "'-1' is no time above 0"),
     'a stretch of 0': (
         tradeoff,
         [*MOTION, '--stretch', '0'],
