@@ -18,19 +18,17 @@ Basis of the Euler-Lagrange equation's solutions, cluster by cluster, and its de
 Roots that crowd together would make separate exponentials nearly dependent; such a cluster is
 spanned by the solutions of its own small equation with unit initial values: an exponential times a
 power series ((28) of docs/derivation.md). From rest to rest, one parity suffices and derivatives 0
-to 5 at one end. A segment between via points needs all twelve solutions, with derivatives up to
-the eleventh at both ends, since neighbours share the conditions there ((V4)).
+to 5 at one end.
 """
 
 from cmath import exp
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
-from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
+from flat_planner_ros.core.motion_law.roots import Cluster
 from flat_planner_ros.core.motion_law.terms import leibniz, Number, series_derivatives, Term
 import numpy as np
 from numpy.typing import NDArray
@@ -53,36 +51,19 @@ ALTERNATING = (-1.0) ** np.arange(CONDITIONS)
 CENTRES_KEPT = 32
 """Solutions around zero that are remembered, mostly 1, x, x^2, x^3."""
 
-BASES_KEPT = 256
-"""Bases that are remembered: those of several paths of fifty via points."""
-
-SPECTRA_KEPT = 64
-"""Sets of roots that are remembered, one for each combination of arm and cost."""
-
 _FACTORIALS = np.cumprod(np.maximum(np.arange(SERIES_LENGTH, dtype=float), 1.0))
 
 _END = np.array([1.0])
 
 _FAR_END = np.array([-2.0])
 
-_PLACES = np.array([-1.0, 0.0, 1.0])
 
-_MIRRORED = np.tile(ALTERNATING, 2)
-
-_ALONE = np.array([[1.0 + 0.0j], [-1j]])
-"""Series of one exponential: its real and its imaginary part."""
-
-
-class Block(NamedTuple):
+class Solutions(NamedTuple):
     """
-    The solutions of one parity that a cluster contributes.
+    Solutions that a cluster contributes, as terms.
 
     Attributes
     ----------
-    growth
-        How fast they grow with the order of the derivative, at least 1 [-].
-    columns
-        Their derivatives 0 to 5 at x = 1, a list of six numbers each.
     rate, origin
         What their terms have in common; with an origin at the end they have a mirror image.
     series
@@ -91,11 +72,16 @@ class Block(NamedTuple):
 
     """
 
-    growth: float
-    columns: list[list[float]]
     rate: complex
     origin: int
     series: FloatArray | ComplexArray | None
+
+    @property
+    def size(self) -> int:
+        """Return how many there are, without mirror images."""
+        if self.series is not None:
+            return len(self.series)
+        return 1 if self.rate.imag == 0.0 else 2
 
     def combined(self, amplitudes: list[float]) -> Term:
         """Return a combination of the solutions, without mirror images."""
@@ -108,15 +94,35 @@ class Block(NamedTuple):
         return Term(self.rate, self.origin, coefficients)
 
 
-def combined(blocks: Iterable[Block], amplitudes: list[float]) -> list[Term]:
+def combined(blocks: Iterable[Solutions], amplitudes: list[float]) -> list[Term]:
     """Return the term of each block in a combination of all their solutions."""
     terms = []
     first = 0
     for block in blocks:
-        last = first + len(block.columns)
+        last = first + block.size
         terms.append(block.combined(amplitudes[first:last]))
         first = last
     return terms
+
+
+class Block(NamedTuple):
+    """
+    The solutions of one parity that a cluster contributes, for the conditions at an end.
+
+    Attributes
+    ----------
+    growth
+        How fast they grow with the order of the derivative, at least 1 [-].
+    columns
+        Their derivatives 0 to 5 at x = 1, a list of six numbers each.
+    solutions
+        The solutions; those with an origin at the end without their mirror images.
+
+    """
+
+    growth: float
+    columns: list[list[float]]
+    solutions: Solutions
 
 
 def block_of(cluster: Cluster, parity: float) -> Block:
@@ -143,8 +149,13 @@ def block_of(cluster: Cluster, parity: float) -> Block:
         if centre.real < FAR:
             [image] = _derivatives(centre, series, _FAR_END, CONDITIONS - 1)
             ends = ends + parity * ALTERNATING * image
-    growth = max(1.0, abs(centre), _spread(cluster.factor))
-    return Block(growth, ends.real.tolist(), centre, origin, series)
+    growth = max(1.0, growth_of(cluster))
+    return Block(growth, ends.real.tolist(), Solutions(centre, origin, series))
+
+
+def growth_of(cluster: Cluster) -> float:
+    """Return how fast a cluster's solutions grow with the order of the derivative [-]."""
+    return max(abs(cluster.centre), _spread(cluster.factor))
 
 
 @lru_cache(maxsize=CENTRES_KEPT)
@@ -158,7 +169,7 @@ def _central(factor: bytes, parity: float) -> Block:
     last = np.flatnonzero(terms.any(axis=0))[-1]
     series = terms[:, : last + 1] / _FACTORIALS[: last + 1]
     columns = series_derivatives(series, CONDITIONS - 1).sum(axis=1).tolist()
-    return Block(max(1.0, _spread(even)), columns, 0j, 0, series)
+    return Block(max(1.0, _spread(even)), columns, Solutions(0j, 0, series))
 
 
 def _exponentials(beta: complex, parity: float) -> Block:
@@ -172,9 +183,9 @@ def _exponentials(beta: complex, parity: float) -> Block:
         power *= beta
     columns = [[value.real for value in values]]
     if beta.imag == 0.0:
-        return Block(abs(beta), columns, beta, 1, None)
+        return Block(abs(beta), columns, Solutions(beta, 1, None))
     columns.append([value.imag for value in values])
-    return Block(abs(beta), columns, beta, 1, None)
+    return Block(abs(beta), columns, Solutions(beta, 1, None))
 
 
 def _lowest_power(parity: float) -> int:
@@ -230,102 +241,6 @@ def unit_solutions(factor: NDArray[Number], terms: int) -> NDArray[Number]:
         table[:, known : shift + more] = table[:, shift:known] @ table[:, size:more]
         known = shift + more
     return table
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SegmentBasis:
-    """
-    Solutions on a segment, in normalised time x from -1 to 1.
-
-    Attributes
-    ----------
-    groups
-        Blocks of solutions, each with whether its mirror image is meant; columns below follow
-        this order.
-    at_start, at_middle, at_end
-        Derivatives 0 to 11 of every solution at x = -1, 0 and 1, shape (12, 12) [-].
-    rates
-        How fast solutions of one parity grow with the order of the derivative, ascending, at
-        least 1, shape (6,) [-].
-
-    """
-
-    groups: tuple[tuple[Block, bool], ...]
-    at_start: FloatArray
-    at_middle: FloatArray
-    at_end: FloatArray
-    rates: FloatArray
-
-    def combined(self, amplitudes: FloatArray) -> tuple[Term, ...]:
-        """Return the terms of a combination of the solutions, amplitudes of shape (12,)."""
-        terms = combined((block for block, _ in self.groups), amplitudes.tolist())
-        return tuple(
-            term.mirrored(1.0) if is_image else term
-            for term, (_, is_image) in zip(terms, self.groups, strict=True)
-        )
-
-
-@lru_cache(maxsize=BASES_KEPT)
-def segment_basis(key: bytes, reference: bytes) -> SegmentBasis:
-    """
-    Return the solutions of an equation.
-
-    Parameters
-    ----------
-    key
-        The bytes of the coefficients a_0 ... a_6 in normalised time.
-    reference
-        These coefficients in another unit of time, common to all segments of a path: in it the
-        roots are found.
-
-    """
-    scale = _scale(np.frombuffer(key), np.frombuffer(reference))
-    found = sorted(_spectrum(reference).clusters(scale), key=lambda cluster: abs(cluster.centre))
-    groups: list[tuple[Block, bool]] = []
-    rates: list[float] = []
-    places: list[FloatArray] = []
-    for cluster in found:
-        even = block_of(cluster, 1.0)
-        rates += [even.growth] * len(even.columns)
-        if even.origin == 0:
-            for block in (even, block_of(cluster, -1.0)):
-                groups.append((block, False))
-                places.append(_derivatives_at(block, _PLACES))
-            continue
-        found_at = _derivatives_at(even, _PLACES - 1.0)
-        # Each solution by itself, not odd and even ones: a boundary layer stays at its own end.
-        groups += [(even, False), (even, True)]
-        places += [found_at, _MIRRORED * found_at[::-1]]
-    at_start, at_middle, at_end = np.concatenate(places, axis=1).swapaxes(1, 2)
-    return SegmentBasis(
-        groups=tuple(groups),
-        at_start=at_start,
-        at_middle=at_middle,
-        at_end=at_end,
-        rates=np.array(sorted(rates)),
-    )
-
-
-@lru_cache(maxsize=SPECTRA_KEPT)
-def _spectrum(reference: bytes) -> Spectrum:
-    """Return the roots of an equation in its reference unit of time."""
-    return Spectrum(np.frombuffer(reference))
-
-
-def _scale(coefficients: FloatArray, reference: FloatArray) -> float:
-    """Return the roots of an equation in units of those of the reference."""
-    # The lowest coefficient carries the highest power of the unit, and least of its rounding.
-    lowest = int(np.flatnonzero(reference)[0])
-    if lowest == CONDITIONS:
-        return 1.0
-    ratio = float(coefficients[lowest] / reference[lowest])
-    return float(ratio ** (0.5 / (CONDITIONS - lowest)))
-
-
-def _derivatives_at(block: Block, places: FloatArray) -> FloatArray:
-    """Return derivatives 0 to 11 of solutions at distances from their origin, (m, columns, 12)."""
-    series = _ALONE[: len(block.columns)] if block.series is None else block.series
-    return np.real(_derivatives(block.rate, series, places, SOLUTIONS - 1))
 
 
 def row_factors(rates: Sequence[float]) -> FloatArray:

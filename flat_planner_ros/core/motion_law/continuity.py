@@ -27,7 +27,8 @@ from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law.basis import CONDITIONS, row_factors, SegmentBasis, SOLUTIONS
+from flat_planner_ros.core.motion_law.basis import CONDITIONS, row_factors, SOLUTIONS
+from flat_planner_ros.core.motion_law.segment_bases import SegmentBasis
 import numpy as np
 
 RESIDUAL_STEPS = 3

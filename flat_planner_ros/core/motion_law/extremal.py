@@ -207,7 +207,8 @@ class _BoundarySolver:
         for _ in range(RESIDUAL_STEPS):
             amplitudes += self._inverse @ (target - self._matrix @ amplitudes)
         terms = []
-        for term in combined(self._blocks, amplitudes.tolist()):
+        solutions = [block.solutions for block in self._blocks]
+        for term in combined(solutions, amplitudes.tolist()):
             terms.append(term)
             if term.origin != 0:  # else it is symmetric by itself
                 terms.append(term.mirrored(self._parity))

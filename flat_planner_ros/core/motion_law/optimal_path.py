@@ -26,16 +26,12 @@ from math import ceil, log2
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import checked_array, FloatArray, InvalidRequest, strict_arithmetic
-from flat_planner_ros.core.motion_law.basis import (
-    CONDITIONS,
-    segment_basis,
-    SegmentBasis,
-    SOLUTIONS,
-)
+from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
 from flat_planner_ros.core.motion_law.continuity import Amplitudes, ContinuitySystem
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
 from flat_planner_ros.core.motion_law.extremal import costate, rounded, stationarity_residual
 from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE, PiecewiseLaw
+from flat_planner_ros.core.motion_law.segment_bases import segment_bases, SegmentBasis
 import numpy as np
 
 PROBES = 8
@@ -166,7 +162,8 @@ def _solved(cost: QuadraticCost, path: PathConditions) -> _Solution:
     halves = 0.5 * np.diff(path.edges)
     powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
     reference = _reference(coefficients).tobytes()
-    bases = [segment_basis(key.tobytes(), reference) for key in rounded(coefficients * powers)]
+    keys = [key.tobytes() for key in rounded(coefficients * powers)]
+    bases = segment_bases(keys, reference)
     # Each segment counts from the value at its start: only steps enter the equations, and a short
     # segment far from zero loses no digits.
     origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])

@@ -101,21 +101,35 @@ class Spectrum:
         self._alone = _polished_roots(self._reduced.tolist(), self._squares.tolist())
         self._grouped: dict[bytes, list[Cluster]] = {}
 
+    def grouping(self, scale: float) -> bytes:
+        """Return what is the same for all factors with which the roots form the same clusters."""
+        return b'' if self._apart(scale) is not None else self._linked(scale).tobytes()
+
     def clusters(self, scale: float = 1.0) -> list[Cluster]:
         """Return the clusters of all roots multiplied by a positive factor."""
-        if self._alone is not None:
-            roots = self._alone if scale == 1.0 else [scale * beta for beta in self._alone]
-            if _are_apart(roots):
-                central = Cluster(centre=0j, factor=_monomial(2 * self._zeros))
-                others = (Cluster(centre=beta, factor=_monomial(1)) for beta in roots)
-                return [central, *others]
-        distances, bridged = self._distances
-        linked: BoolArray = distances <= np.maximum(LINK / scale, bridged)
+        roots = self._apart(scale)
+        if roots is not None:
+            central = Cluster(centre=0j, factor=_monomial(2 * self._zeros))
+            others = (Cluster(centre=beta, factor=_monomial(1)) for beta in roots)
+            return [central, *others]
+        linked = self._linked(scale)
         key = linked.tobytes()
         if key not in self._grouped:
             self._grouped[key] = self._of_groups(linked)
         found = self._grouped[key]
-        return found if scale == 1.0 else [cluster.scaled(scale) for cluster in found]
+        return list(found) if scale == 1.0 else [cluster.scaled(scale) for cluster in found]
+
+    def _apart(self, scale: float) -> list[complex] | None:
+        """Return the roots multiplied by a factor, if each is a cluster of its own."""
+        if self._alone is None:
+            return None
+        roots = self._alone if scale == 1.0 else [scale * beta for beta in self._alone]
+        return roots if _are_apart(roots) else None
+
+    def _linked(self, scale: float) -> BoolArray:
+        """Tell which roots share a cluster, the mirror images included, shape (12, 12)."""
+        distances, bridged = self._distances
+        return np.asarray(distances <= np.maximum(LINK / scale, bridged))
 
     @cached_property
     def _beta(self) -> ComplexArray:

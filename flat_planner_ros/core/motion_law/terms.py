@@ -24,7 +24,7 @@ every time; the others are summed one by one.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from itertools import pairwise, zip_longest
+from itertools import pairwise
 from math import comb
 from typing import NamedTuple, TypeVar
 
@@ -274,20 +274,21 @@ def series_derivatives(series: NDArray[Number], order: int) -> NDArray[Number]:
 
 def _power_table(series: Sequence[tuple[complex, ...]], order: int) -> FloatArray:
     """Return the coefficients of the derivatives of a sum of power series, powers in columns."""
-    alike = zip_longest(*series, fillvalue=0j)
-    total = np.array([sum(coefficients).real for coefficients in alike])
+    total = np.zeros(max(map(len, series)))
+    for coefficients in series:
+        total[: len(coefficients)] += np.real(coefficients)
     return _trimmed(series_derivatives(total, order), 1.0).T
 
 
-def leibniz(rate: complex, order: int) -> ComplexArray:
+def leibniz(rates: complex | ComplexArray, order: int) -> ComplexArray:
     """Return the factors of f, f', ... in the derivatives of exp(rate u) f at exp(rate u) = 1."""
-    powers = np.empty(order + 2, dtype=complex)
-    powers[0] = 1.0
-    powers[1:-1] = rate
-    powers[-1] = 0.0
-    np.multiply.accumulate(powers, out=powers)
+    powers = np.empty((*np.shape(rates), order + 2), dtype=complex)
+    powers[..., 0] = 1.0
+    powers[..., 1:-1] = np.expand_dims(rates, -1)
+    powers[..., -1] = 0.0
+    np.multiply.accumulate(powers, axis=-1, out=powers)
     binomials, index = _pascal(order)
-    factors: ComplexArray = powers[index]
+    factors: ComplexArray = powers[..., index]
     factors *= binomials
     return factors
 

@@ -18,10 +18,10 @@ from functools import partial
 
 from flat_planner_ros.core.arm.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
-from flat_planner_ros.core.motion_law.basis import segment_basis
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremals
 from flat_planner_ros.core.motion_law.optimal_path import optimal_path, path_cost, PathConditions
+from flat_planner_ros.core.motion_law.segment_bases import known_basis
 import numpy as np
 from path_programme import programmed_path
 import pytest
@@ -219,13 +219,13 @@ def test_the_work_is_that_of_the_segments(costs):
     rng = np.random.default_rng(2)
     for count in (10, 20, 40):
         edges = np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.0, count))])
-        before = segment_basis.cache_info().misses
+        before = known_basis.cache_info().misses
         certified(costs['effort'], path(edges, rng.normal(size=count)))
-        assert segment_basis.cache_info().misses - before == count
+        assert known_basis.cache_info().misses - before == count
     edges = np.arange(41.0)
-    before = segment_basis.cache_info().misses
+    before = known_basis.cache_info().misses
     certified(costs['effort'], path(edges, rng.normal(size=40)))
-    assert segment_basis.cache_info().misses - before == 1
+    assert known_basis.cache_info().misses - before == 1
 
 
 @pytest.mark.parametrize('name', STRATEGIES)
