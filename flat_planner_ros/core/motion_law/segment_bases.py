@@ -50,7 +50,7 @@ SPECTRA_KEPT = 64
 TABLES_KEPT = 64
 """Tables of powers that are remembered."""
 
-OCTAVES = 3.0
+OCTAVES = 8.0
 """Range of units of time whose solutions follow from one of them, in powers of two [-]."""
 
 PLACES = (-1.0, 0.0, 1.0)
