@@ -195,9 +195,10 @@ class Oscillator:
                 [k.low, c.high, i.high],
             ]
         )
-        ends = np.roll(corners, -1, axis=0)
+        following = [1, 2, 3, 4, 5, 0]
+        ends = corners[following]
         poles = self.poles(corners)
-        turns = duration * np.abs(np.roll(poles, -1) - poles)
+        turns = duration * np.abs(poles[following] - poles)
         edges = []
         for begin, end, turn in zip(corners, ends, turns.tolist(), strict=True):
             if (begin == end).all():

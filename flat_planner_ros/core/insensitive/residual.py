@@ -285,6 +285,8 @@ def _largest_miss(
     arm: PlanarArm, effort: FloatArray, duration: float, box: UncertaintyBox
 ) -> float:
     """Return how far from the goal an effort leaves a heavier or lighter arm, (I18) [rad]."""
+    if box.ranges[2] == (1.0, 1.0):
+        return 0.0
     both, last = arm.inertia_star
     step = duration / (len(effort) - 1)
     # The momentum of the last two links, integrated: exact for an effort of hats.

@@ -30,6 +30,9 @@ from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, row_factors, SOLUTIONS
 from flat_planner_ros.core.motion_law.segment_bases import SegmentBasis
 import numpy as np
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int_]
 
 RESIDUAL_STEPS = 3
 """Corrections of the solved amplitudes by the residual of the conditions."""
@@ -154,14 +157,14 @@ class ContinuitySystem:
         size = self._column_factors.size
         banded = np.zeros((3 * BAND + 1, size), order='F')
 
-        def put(block: FloatArray, row: int, column: int) -> None:
-            rows = row + np.arange(block.shape[0])[:, None]
-            columns = column + np.arange(block.shape[1])
+        def put(block: FloatArray, row: int | IntArray, column: int | IntArray) -> None:
+            rows = row + np.arange(block.shape[-2])[:, None]
+            columns = column + np.arange(block.shape[-1])
             banded[2 * BAND + rows - columns, columns] = block
 
         put(self._start, 0, 0)
-        for index, block in enumerate(self._knots):
-            put(block, CONDITIONS + SOLUTIONS * index, SOLUTIONS * index)
+        first = SOLUTIONS * np.arange(len(self._knots))[:, None, None]
+        put(self._knots, CONDITIONS + first, first)
         put(self._end, size - CONDITIONS, size - SOLUTIONS)
         return banded
 
