@@ -122,8 +122,8 @@ class Starts:
             if elapsed > SLOW:
                 print(f'{what}: took {elapsed:.1f} s to end', flush=True)
             process.kill()
-        if code == -number:  # before Python has read the first line
-            return ''
+        if code == -number or 'init_import_site' in process.stderr:
+            return ''  # before Python has read the first line
         return '' if code == 0 else f'{what}: exit code {code}\n{process.stderr}'
 
 
