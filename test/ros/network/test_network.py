@@ -96,7 +96,7 @@ def test_nodes_with_the_profile_hear_those_without(network, user):
 
 
 def parted(network, user, share, takeover=()):
-    """Cut the network in a motion to 2 rad; return its verdict, the takeover's, and what is new."""
+    """Cut the network in a motion to 2 rad; return both verdicts and what is new."""
     for _ in range(ATTEMPTS):
         network.be(*NO_HARM)
         before = user('wait', 0.3)
