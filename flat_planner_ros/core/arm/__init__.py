@@ -52,9 +52,9 @@ from flat_planner_ros.core.arm.samples import (
     SampledMotion,
     SampleTable,
     travel,
-    TurnCounter,
 )
 from flat_planner_ros.core.arm.sparse_points import sparse_rows
+from flat_planner_ros.core.arm.turns import TurnCounter
 from flat_planner_ros.core.arm.urdf import (
     ArmDescription,
     ControlBlock,

@@ -15,8 +15,7 @@
 """Motion in samples: those that drivers measure, and what lies between those of a plan."""
 
 from bisect import bisect_right
-from dataclasses import dataclass, replace
-from math import pi
+from dataclasses import dataclass
 from typing import TypeVar
 
 from flat_planner_ros.core.arm.arrays import FloatArray
@@ -36,15 +35,6 @@ CURVATURE = 1.5
 
 UNKNOWN_SPEED = 30.0
 """Speed that a joint may have where its velocity is not measured [rad/s]."""
-
-RIM = 0.05
-"""Angle by which noise may carry a joint that is wrapped to +-pi beyond [rad]."""
-
-SAME_PLACE = 0.5
-"""Distance from a planned pose, turns apart, up to which an arm is taken to be there [rad]."""
-
-TURN = 2.0 * pi
-"""Angle of a whole turn [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
@@ -132,88 +122,12 @@ class JointStateRules:
     tolerance
         Distance in time within which all joints of a sample that comes in parts were heard [s].
     unwrap
-        Whether the turns of joints that are wrapped to +-pi are counted.
+        Whether the turns of joints that are wrapped, to +-pi or to 0 ... 2 pi, are counted.
 
     """
 
     tolerance: float = MERGING_TOLERANCE
     unwrap: bool = True
-
-
-class TurnCounter:
-    """
-    Carries angles on beyond +-pi where encoders wrap them.
-
-    A step counts as a turn if both angles are within +-pi and if the joint can have moved by what
-    the step lacks to 2 pi: an arm that is put elsewhere has not turned.
-    """
-
-    def __init__(self) -> None:
-        self._former: JointSample | None = None
-        self._turns: FloatArray | None = None
-        self._place: FloatArray | None = None
-
-    def unwrapped(self, sample: JointSample) -> JointSample:
-        """Return the next sample with its turns, the very same one where there are none."""
-        former = self._former
-        self._former = sample
-        if former is not None:
-            change = sample.positions - former.positions
-            # Cheap, and enough to tell that no joint has moved by more than pi; not so with a NaN.
-            if not np.abs(change).max() <= pi:
-                self._count(former, sample)
-        elif self._place is not None:
-            self.align(self._place)
-        if self._turns is None:
-            return sample
-        return replace(sample, positions=sample.positions + TURN * self._turns)
-
-    def unwrapped_table(self, samples: SampleTable) -> SampleTable | None:
-        """Return the next samples with their turns; None, and none taken, where a joint turns."""
-        former = self._former
-        if former is None:
-            return None
-        change = np.diff(samples.positions, axis=0, prepend=former.positions[None])
-        if not np.abs(change).max() <= pi:
-            return None
-        self._former = samples.sample(-1)
-        if self._turns is None:
-            return samples
-        return replace(samples, positions=samples.positions + TURN * self._turns)
-
-    def align(self, place: FloatArray) -> None:
-        """Count from the turns of a pose [rad] near which the arm is, or will be when heard."""
-        self._place = place
-        if self._former is None:
-            return
-        raw, turns = self._former.positions, self.turns
-        wanted = np.round((place - raw) / TURN)
-        is_there = np.abs(place - raw - TURN * wanted) <= SAME_PLACE
-        is_there &= np.abs(raw) <= pi + RIM
-        aligned = np.where(is_there, wanted, turns)
-        if (aligned != turns).any():
-            self._turns = aligned
-
-    @property
-    def turns(self) -> FloatArray:
-        """Return by how many turns each angle is carried on, shape (n,) [-]."""
-        if self._turns is not None:
-            return self._turns
-        return np.zeros(0 if self._former is None else len(self._former.positions))
-
-    def _count(self, former: JointSample, sample: JointSample) -> None:
-        """Count the turns of a step."""
-        raw, last = sample.positions, former.positions
-        change = raw - last
-        is_turn = np.abs(change) > pi
-        is_turn &= np.maximum(np.abs(raw), np.abs(last)) <= pi + RIM
-        is_turn &= TURN - np.abs(change) <= JUMP + travel(former, sample)
-        if is_turn.any():
-            self._turns = self.turns - np.sign(change) * is_turn
-        unknown = np.isnan(raw)
-        if unknown.any():
-            # What the angle was before is still to be compared with.
-            self._former = replace(sample, positions=np.where(unknown, last, raw))
 
 
 def travel(former: JointSample, sample: JointSample) -> FloatArray:

@@ -20,7 +20,7 @@ along a straight line in time, one reason, and idleness until the next command.
 """
 
 from enum import Enum
-from math import inf
+from math import inf, pi, remainder, tau
 
 from flat_planner_ros.core.arm import FloatArray, InvalidCommand, JointSample, PlanarArm
 from flat_planner_ros.core.tracking.arm_observer import Estimate
@@ -130,10 +130,10 @@ class Tracker:
         if self.phase is Phase.TRACKING:
             self.phase, self._released, self._last = Phase.RELEASING, now, self._efforts
 
-    def drop(self, now: float) -> FloatArray | None:
+    def drop(self, now: float, fault: str = '') -> FloatArray | None:
         """Return zero efforts, from now on and without a ramp; None if none were applied."""
         was_idle = self.phase is Phase.IDLE
-        self.release(now)
+        self.release(now, fault)
         self.phase = Phase.IDLE
         self._efforts = np.zeros(self._joints - 1)
         return None if was_idle else self._efforts
@@ -185,7 +185,10 @@ class Tracker:
             self._observer.restart(sample)
             return
         surprise = self._observer.correct(sample)
-        if surprise > limit:
+        if self.phase is Phase.IDLE and surprise > pi and abs(remainder(surprise, tau)) <= limit:
+            # Turns are counted from those of the motion that is to begin.
+            self._observer.restart(sample)
+        elif surprise > limit:
             self._give_up(
                 now,
                 f'a joint jumped by {surprise:.3g} rad, beyond {limit:g} rad',

@@ -30,6 +30,7 @@ from flat_planner_ros.ros.nodes.early_loading import load_early, REPORTING
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
+from flat_planner_ros.ros.nodes.joint_state_input import JointStateInput
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.stamp_clock import StampClock
 from flat_planner_ros.ros.parameters.arm_model import model_parameters
@@ -55,9 +56,6 @@ DIAGNOSTICS_PERIOD = 1.0
 
 SAME_CLOCK = 3600.0
 """Distance of a plan's start from the node's time below which both are of one clock [s]."""
-
-WARNING_PERIOD = 5.0
-"""Shortest time between two warnings about the same input [s]."""
 
 
 class MonitorNode(GuardedNode):
@@ -93,6 +91,7 @@ class MonitorNode(GuardedNode):
         self._watch = GraphWatch(
             self, self._log, [plan], [interfaces.JOINT_STATES], is_listening=True
         )
+        self._input = JointStateInput(self._log, self._watch, self._now)
         self.create_service(Trigger, interfaces.RESET, self._on_reset)
         # A simulated clock can stand still; noticing that must not depend on it.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -153,17 +152,8 @@ class MonitorNode(GuardedNode):
         # A simulated clock is everybody's, and is heard in steps, perhaps after what it stamps.
         if stamps.is_stamped(msg) and not stamps.is_simulated(self.get_clock()):
             self._monitor.hear(stamps.seconds(msg.header.stamp), self._now())
-        try:
-            for sample in self._reader.read(msg, self._now):
-                self._take(sample, msg.header, self._reader.joints)
-        except FlatPlannerError as error:
-            self._watch.heard_other_part()
-            self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
-            return
-        if self._reader.is_in_parts:
-            self._watch.heard_other_part()
-        for remark in self._reader.take_remarks():
-            self._log.warning(remark)
+        for sample in self._input.samples(self._reader, msg):
+            self._take(sample, msg.header, self._reader.joints)
 
     def _take(self, sample: JointSample, header: Header, joints: Sequence[str]) -> None:
         """Take a sample and tell how far it is from the plan."""

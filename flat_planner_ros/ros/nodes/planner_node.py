@@ -21,7 +21,6 @@ from time import perf_counter
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import clock_fault, Goal, Motion, PlannerSession, Shortfall
 from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
@@ -32,6 +31,7 @@ from flat_planner_ros.ros.nodes.goal_queue import GoalQueue, Read, Tell, tell_no
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import planner_sentence
+from flat_planner_ros.ros.nodes.joint_state_input import JointStateInput
 from flat_planner_ros.ros.nodes.model_adoption import ModelAdoption
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.rest_services import RestServices
@@ -46,9 +46,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
-
-WARNING_PERIOD = 5.0
-"""Shortest time between two warnings about the same input [s]."""
 
 
 class PlannerNode(GuardedNode):
@@ -84,6 +81,7 @@ class PlannerNode(GuardedNode):
         self._watch = GraphWatch(
             self, self._log, commands, [interfaces.JOINT_STATES], is_listening=True
         )
+        self._input = JointStateInput(self._log, self._watch, self._now)
         self._clocks = ClockWatch(self, self._on_jump, self._report_ended)
         self._apply(self._settings)
         load_early(self, PLANNING)
@@ -162,17 +160,10 @@ class PlannerNode(GuardedNode):
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
-        try:
-            for sample in self._reader.read(msg, self._now):
-                self._session.measure(sample, self._now())
-        except FlatPlannerError as error:
-            self._watch.heard_other_part()
-            self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
+        for sample in self._input.samples(self._reader, msg):
+            self._session.measure(sample, self._now())
         if self._reader.is_in_parts:
-            self._watch.heard_other_part()
             self._session.lack = self._reader.lack
-        for remark in self._reader.take_remarks():
-            self._log.warning(remark)
         self._goals.answer_due()
 
     def _on_replan(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -24,11 +24,12 @@ from flat_planner_ros.core.tracking import Tracker
 from flat_planner_ros.ros.nodes.graph_watch import GraphWatch
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
+from flat_planner_ros.ros.nodes.joint_state_input import JointStateInput
 from flat_planner_ros.ros.nodes.node_runner import run
 from flat_planner_ros.ros.nodes.rival_watch import RivalWatch
 from flat_planner_ros.ros.nodes.tracker_renewal import TrackerRenewal
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
-from flat_planner_ros.ros.parameters.tracker import build, ROWS
+from flat_planner_ros.ros.parameters.tracker import build, ROWS, TrackerNodeSettings
 from flat_planner_ros.ros.wire import conversions, diagnostics, estimates, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.tracked_motion import tracked_motion
@@ -44,11 +45,11 @@ LOOKS = 4
 LATE_LOOK = 2.0
 """Looks that come later, in terms of their period, say nothing: samples may be waiting [-]."""
 
+ELDER = 'another tracker moves this arm and was started before: this one keeps silent'
+"""Why a tracker does nothing."""
+
 HEALTH_PERIOD = 1.0
 """Time between two messages on `/diagnostics` [s]."""
-
-WARNING_PERIOD = 1.0
-"""Shortest time between two warnings about the same input [s]."""
 
 
 class TrackerNode(GuardedNode):
@@ -57,12 +58,12 @@ class TrackerNode(GuardedNode):
     def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.TRACKER, **options)
-        settings = NodeParameters(self, ROWS, build, lambda _: None).settings
+        settings = NodeParameters(self, ROWS, build, self._apply).settings
         self._joints = settings.joints
         self._tracker = Tracker(settings.arm, settings.tracker)
         self._renewal = TrackerRenewal(settings.arm, settings.tracker)
         self._fault = ''
-        self._reader = JointStateReader(settings.joints)
+        self._reader = JointStateReader(settings.joints, settings.joint_states)
         efforts = interfaces.EFFORT_COMMANDS
         self._efforts = self.create_publisher(Float64MultiArray, efforts, interfaces.RELIABLE)
         command = interfaces.topic_of(interfaces.PLANNER, interfaces.COMMAND)
@@ -73,7 +74,14 @@ class TrackerNode(GuardedNode):
         status = interfaces.topic_of(interfaces.PLANNER, interfaces.STATUS)
         listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
         self._watch = GraphWatch(self, self._log, [efforts, command], [states], is_listening=True)
-        self._rivals = RivalWatch(self, self._efforts, self._on_rival)
+        self._input = JointStateInput(self._log, self._watch, self._now)
+        self._rivals = RivalWatch(
+            self,
+            self._efforts,
+            on_elder=self._on_elder,
+            on_rival=self._on_rival,
+            introduce=self._on_health,
+        )
         self._health = self.create_publisher(
             DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE
         )
@@ -94,6 +102,10 @@ class TrackerNode(GuardedNode):
         )
         return f'{arm_sentence(self._joints, Drive.EFFORT)}; tracks the command on {command}'
 
+    def _apply(self, settings: TrackerNodeSettings) -> None:
+        """Read joint states with changed parameters from now on; the others are fixed."""
+        self._reader.rules = settings.joint_states
+
     def rest(self) -> None:
         """Give no more efforts until the next command; the last ones are zero."""
         self._send(self._tracker.drop(self._now()))
@@ -105,25 +117,20 @@ class TrackerNode(GuardedNode):
     def _on_command(self, data: bytes) -> None:
         """Follow a motion; one that cannot be followed leaves the present one alone."""
         now = self._now()
+        if self._rivals.has_elder:
+            self._log.warning(f'command ignored: {ELDER}')
+            return
         try:
-            points = conversions.points_of(data)
-            self._tracker.follow(tracked_motion(points, self._joints, now), now)
+            motion = tracked_motion(conversions.points_of(data), self._joints, now)
+            self._tracker.follow(motion, now)
+            self._reader.align(motion.at(motion.start).positions)
             self._fault = ''
         except FlatPlannerError as error:
             self._log.warning(f'command ignored: {error}')
 
     def _on_measured(self, msg: JointState) -> None:
         """Answer the samples that a message completes with efforts."""
-        try:
-            samples = self._reader.read(msg, self._now)
-        except FlatPlannerError as error:
-            self._watch.heard_other_part()
-            self._log.warning(f'joint state ignored: {error}', WARNING_PERIOD)
-            return
-        if self._reader.is_in_parts:
-            self._watch.heard_other_part()
-        for remark in self._reader.take_remarks():
-            self._log.warning(remark)
+        samples = self._input.samples(self._reader, msg)
         self._tracker = self._renewal.renewed(self._tracker, self._now())
         for sample in samples:
             self._send(self._tracker.hear(sample, max(self._now(), sample.time)))
@@ -142,6 +149,10 @@ class TrackerNode(GuardedNode):
         except FlatPlannerError as error:
             self._log.warning(f"the planner's model is not followed: {error}")
 
+    def _on_elder(self) -> None:
+        """Leave the arm to the tracker that was started before."""
+        self._send(self._tracker.drop(self._now(), ELDER))
+
     def _on_rival(self) -> None:
         """Let go of an arm that somebody else moves, too."""
         self._tracker.release(
@@ -156,7 +167,11 @@ class TrackerNode(GuardedNode):
             self._log.warning(refusal)
         tracker = self._tracker
         status = diagnostics.tracker_status(
-            tracker.phase.value, tracker.error, self._fault, tracker.certificate
+            tracker.phase.value,
+            tracker.error,
+            self._fault,
+            tracker.certificate,
+            self._rivals.seniority,
         )
         status.hardware_id = self.get_fully_qualified_name()
         self._health.publish(diagnostics.array_of(status, self._now()))

@@ -29,7 +29,7 @@ JOINT_STATE_ROWS = [
         'joint_states.unwrap',
         JointStateRules.unwrap,
         '',
-        'count the turns of joints that are wrapped to +-pi',
+        'count the turns of joints that are wrapped, to +-pi or to 0 ... 2 pi',
     ),
 ]
 

@@ -17,9 +17,10 @@
 from dataclasses import dataclass
 from math import inf
 
-from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.arm import JointStateRules, PlanarArm
 from flat_planner_ros.core.tracking import TrackerSettings, Uncertainty
 from flat_planner_ros.ros.parameters.arm_model import arm_of, FIXED_MODEL_ROWS, per_joint
+from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
 from flat_planner_ros.ros.parameters.row import DOUBLES, Row, Values
 
 
@@ -36,12 +37,15 @@ class TrackerNodeSettings:
         The nominal model.
     tracker
         The loop, its bandwidths, and when it gives up.
+    joint_states
+        How they are read.
 
     """
 
     joints: tuple[str, ...]
     arm: PlanarArm
     tracker: TrackerSettings
+    joint_states: JointStateRules
 
 
 ROWS = [
@@ -211,6 +215,7 @@ ROWS = [
         'false = let go',
         read_only=True,
     ),
+    *JOINT_STATE_ROWS,
 ]
 """All parameters of the tracker node."""
 
@@ -250,4 +255,6 @@ def build(values: Values) -> TrackerNodeSettings:
         effort_limit=per_joint(values, 'limits.effort', arm.n - 1) or (inf,),
         **{name: values[name] for name in SAME_NAMES},
     )
-    return TrackerNodeSettings(joints=joints, arm=arm, tracker=tracker)
+    return TrackerNodeSettings(
+        joints=joints, arm=arm, tracker=tracker, joint_states=joint_state_rules(values)
+    )

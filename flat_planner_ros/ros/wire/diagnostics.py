@@ -241,7 +241,7 @@ def monitor_status(
 
 
 def tracker_status(
-    phase: str, error: float, fault: str, certificate: Certificate
+    phase: str, error: float, fault: str, certificate: Certificate, seniority: str
 ) -> DiagnosticStatus:
     """
     Return the present state of a tracker.
@@ -256,6 +256,8 @@ def tracker_status(
         Why tracking was given up last, until the next command; empty if it was not.
     certificate
         Of its loop.
+    seniority
+        Which efforts it sends, and since when it lives.
 
     """
     is_tracking = phase == 'tracking'
@@ -265,6 +267,7 @@ def tracker_status(
         'error': error if is_tracking else None,
         'decay_rate': certificate.decay_rate,
         'margin': certificate.margin,
+        'seniority': seniority,
     }
     level = DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK
     return status_msg(TRACKER_NAME, level, f'{phase}; {fault}' if fault else message, values)

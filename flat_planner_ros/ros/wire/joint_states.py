@@ -94,6 +94,7 @@ class JointStateReader:
         self._layout = _Layout(slice(None), None, TurnCounter())
         self._known: dict[tuple[str, ...], _Layout] = {}
         self._remarks: dict[str, bool] = {}
+        self._has_remarks = False
         self._whole = -inf
         self._said: FloatArray | None = None
 
@@ -117,8 +118,14 @@ class JointStateReader:
         """Return why parts give no present sample, a clause; empty where they do."""
         return self._merger.lack
 
+    @property
+    def has_remarks(self) -> bool:
+        """Tell whether something is to be said of the messages."""
+        return self._has_remarks
+
     def take_remarks(self) -> list[str]:
         """Return what is remarkable about the messages, a sentence each, each once."""
+        self._has_remarks = False
         new = [remark for remark, is_told in self._remarks.items() if not is_told]
         self._remarks.update(dict.fromkeys(new, True))
         return new
@@ -214,7 +221,7 @@ class JointStateReader:
         """
         Count turns from those of a planned pose near which the arm is, shape (n,) [rad].
 
-        Encoders that are wrapped to +-pi do not tell how often they have turned before.
+        Encoders that are wrapped do not tell how often they have turned before.
         """
         self._place = pose
         for part, counter in self._counters.items():
@@ -234,11 +241,12 @@ class JointStateReader:
         if counter.turns is self._said:
             return
         self._said = counter.turns
-        for index, turns in zip(part or range(len(self.joints)), counter.turns, strict=True):
+        indices = part or range(len(self.joints))
+        for place, (index, turns) in enumerate(zip(indices, counter.turns, strict=True)):
             if turns:
                 self._remark(
-                    f'{self.joints[index]} is wrapped to +-pi in joint states: its turns are '
-                    'counted (joint_states.unwrap)'
+                    f'{self.joints[index]} is wrapped to {counter.range_of(place)} in joint '
+                    'states: its turns are counted (joint_states.unwrap)'
                 )
 
     def _layout_of(self, names: list[str]) -> _Layout:
@@ -269,7 +277,9 @@ class JointStateReader:
 
     def _remark(self, remark: str) -> None:
         """Keep a remark that is new."""
-        self._remarks.setdefault(remark, False)
+        if remark not in self._remarks:
+            self._remarks[remark] = False
+            self._has_remarks = True
 
 
 def _optional(values: 'array[float]', count: int, places: Places) -> FloatArray | None:

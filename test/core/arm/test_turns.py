@@ -64,6 +64,31 @@ def test_an_encoder_that_flickers_at_pi_stands_still():
     assert unwrapped(counter, *samples)[1:, 0] == pytest.approx(angles, abs=1e-12)
 
 
+def whole(angles):
+    """Return angles within 0 ... 2 pi, as an encoder shows them."""
+    return np.asarray(angles, dtype=float) % (2.0 * pi)
+
+
+@pytest.mark.parametrize('knows_velocity', [True, False])
+def test_turns_of_an_encoder_from_zero_to_two_pi_are_counted_in_both_directions(knows_velocity):
+    times = np.arange(0.0, 4.0, 0.005)
+    angles = 4.0 + 9.0 * np.sin(1.5 * times)[:, None]
+    rates = 13.5 * np.cos(1.5 * times)[:, None] if knows_velocity else [None] * len(times)
+    counter = TurnCounter()
+    rows = zip(times, whole(angles), rates, strict=True)
+    assert unwrapped(counter, *(sample(*row) for row in rows)) == pytest.approx(angles, abs=1e-12)
+    assert counter.range_of(0) == '0 to 2 pi'
+
+
+def test_such_an_encoder_that_flickers_at_zero_stands_still():
+    rng = np.random.default_rng(5)
+    shown = whole(1e-3 * rng.standard_normal(200))
+    assert np.ptp(shown) > 6.0
+    counter = TurnCounter()
+    samples = [sample(0.005 * k, [q], [0.0]) for k, q in enumerate([0.001, *shown])]
+    assert np.abs(unwrapped(counter, *samples)).max() < 5e-3
+
+
 @pytest.mark.parametrize(
     ('before', 'after'),
     [(3.0, -0.3), (1.75, -1.75), (2.9, -2.9), (2 * pi, 0.0), (7.0, 0.7), (3.5, -2.7)],
@@ -102,3 +127,10 @@ def test_a_pose_tells_the_turns_of_before(is_heard_before):
     counter.align(np.array([2 * pi - 3.0, 3.0, 1.1]))
     (found,) = unwrapped(counter, sample(0.005, [-3.05, 0.0, 1.0]))
     assert found == pytest.approx([2 * pi - 3.05, 0.0, 1.0])
+
+
+def test_a_pose_tells_the_turn_of_an_encoder_from_zero_to_two_pi():
+    counter = TurnCounter()
+    counter.align(np.array([-0.1]))
+    (found,) = unwrapped(counter, sample(0.0, [2 * pi - 0.1]))
+    assert found == pytest.approx([-0.1])

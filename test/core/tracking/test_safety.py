@@ -15,6 +15,7 @@
 """What the tracker does not understand ends in efforts of zero, one reason, and idleness."""
 
 from dataclasses import replace
+from math import tau
 
 from core.conftest import ARM
 from core.tracking.closed_loop import ClosedLoop, motion_of, samples_of
@@ -81,6 +82,15 @@ def test_nothing_is_sent_before_the_motion_begins(samples):
     loop.run(0.03)
     assert loop.tracker.phase is Phase.TRACKING
     assert loop.commanded
+
+
+def test_a_turn_that_is_counted_before_a_motion_begins_is_no_jump(samples):
+    loop = ClosedLoop(Tracker(ARM, SETTINGS), ARM)
+    loop.run(START, lambda sample: replace(sample, positions=sample.positions - [tau, 0.0]))
+    loop.tracker.follow(motion_of(samples, start=START + 0.05), START)
+    loop.run(0.2)
+    assert loop.tracker.phase is Phase.TRACKING
+    assert loop.tracker.error < 5e-3
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ NODES = {
     'flat_monitor': MonitorNode,
     'flat_tracker': TrackerNode,
 }
-LISTENS_TO_ITSELF = {'flat_tracker': {'/flat_tracker/effort_commands'}}
+LISTENS_TO_ITSELF = {'flat_tracker': {'/diagnostics', '/flat_tracker/effort_commands'}}
 """Topics that a node hears only once somebody else publishes there."""
 
 

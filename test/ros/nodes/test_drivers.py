@@ -156,10 +156,14 @@ def test_a_goal_starts_from_a_joint_state_without_a_stamp(graph):
     assert len(graph.logged('joint states have no stamp')) == 1
 
 
-def test_a_goal_starts_from_the_turns_that_a_wrapped_joint_has_made(graph):
+@pytest.mark.parametrize(
+    ('shown', 'start', 'said'),
+    [((3.1, -3.1), 2 * pi - 3.1, '+-pi'), ((0.02, 2 * pi - 0.01), -0.01, '0 to 2 pi')],
+)
+def test_a_goal_starts_from_the_turns_that_a_wrapped_joint_has_made(graph, shown, start, said):
     drivers = Drivers(graph)
     plans = graph.collect(JointTrajectory, '/flat_planner/plan', interfaces.LATCHED)
-    for angle in (3.1, -3.1):
+    for angle in shown:
         drivers.publish(joint1=angle, joint2=0.0)
         graph.expect(
             lambda q=angle: (
@@ -168,10 +172,11 @@ def test_a_goal_starts_from_the_turns_that_a_wrapped_joint_has_made(graph):
             ),
             'the sample',
         )
-    assert drivers.send(goal(3.5))['state'] == 'ACCEPTED'
+    assert drivers.send(goal(start + 0.4))['state'] == 'ACCEPTED'
     graph.expect(lambda: plans, 'a plan')
-    assert plans[0].points[0].positions[0] == pytest.approx(2 * pi - 3.1)
-    assert len(graph.logged('joint1 is wrapped to +-pi')) == 1
+    assert plans[0].points[0].positions[0] == pytest.approx(start)
+    graph.expect(lambda: graph.logged('joint1 is wrapped'), 'the remark')
+    assert len(graph.logged(f'joint1 is wrapped to {said}')) == 1
 
 
 def plan(start=0.0, final=1.0):

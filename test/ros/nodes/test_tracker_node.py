@@ -25,6 +25,7 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
 EFFORTS = '/flat_tracker/effort_commands'
+ELDER = 'another tracker moves this arm and was started before'
 
 PLANT = {
     'input': 'tracker',
@@ -68,17 +69,17 @@ class Tracked(Rig):
         self.wait_until(stamp(self.states[-1]) + duration)
 
     def move_until_rivals_meet(self, *positions):
-        """Move until a tracker lets go for another; return where to, one may not hear at first."""
+        """Move until a tracker leaves it to another; return where to, one may not hear at first."""
         for position in positions:
             self.move(position)
             self.graph.spin_until(lambda: self.has_met() or stamp(self.states[-1]) > self.end)
             if self.has_met():
                 return position
-        return pytest.fail('no tracker lets go')
+        return pytest.fail('no tracker leaves the arm to the other')
 
     def has_met(self):
-        """Return whether a tracker has let go for another."""
-        return bool(self.graph.logged('another node sends efforts'))
+        """Return whether a tracker leaves the arm to another."""
+        return bool(self.graph.logged(ELDER))
 
     def errors(self, time, position):
         """Return the largest error and swing from a time on [rad]."""
@@ -142,16 +143,27 @@ def test_a_second_tracker_lets_go_of_an_arm_that_another_one_holds(graph):
     position = arm.move_until_rivals_meet(0.0, 0.5, 0.0, 0.5)
     arm.wait_until(arm.end + 0.3)
     assert (arm.errors(arm.end + 0.2, position) < 5e-3).all()
-    assert len(graph.logged('given up')) == 0
+    assert not graph.logged('given up')
 
 
-def test_of_two_idle_trackers_one_lets_go_at_least(graph):
-    """Whichever hears the other first; that one is then silent, and the other may go on alone."""
+def test_of_two_idle_trackers_the_one_that_was_started_first_moves_the_arm(graph):
+    """Exactly one: if both let go, an arm in motion would be left to itself."""
     arm = Tracked(graph)
-    # With the same gains, the two might send the very same efforts, and nobody would be wrong.
-    arm.start_tracker(observer_ratio=5.5)
-    arm.pass_time(0.3)
-    arm.move_until_rivals_meet(0.5, 0.0, 0.5, 0.0)
+    arm.start_tracker()
+    position = arm.move_until_rivals_meet(0.5, 0.0, 0.5, 0.0)
+    arm.wait_until(arm.end + 0.3)
+    assert (arm.errors(arm.end + 0.2, position) < 5e-3).all()
+    assert len(graph.logged(ELDER)) == 1
+    assert not graph.logged('another node sends efforts')
+
+
+def test_whoever_else_sends_efforts_has_the_arm(graph):
+    arm = Tracked(graph)
+    arm.move(0.5)
+    arm.wait_until(arm.end + 0.1)
+    other = graph.probe.create_publisher(Float64MultiArray, EFFORTS, 10)
+    graph.probe.create_timer(0.05, lambda: other.publish(Float64MultiArray(data=[1e-5])))
+    graph.expect(lambda: graph.logged('another node sends efforts'), 'an error')
 
 
 def test_the_health_of_a_tracker_is_published(graph):
