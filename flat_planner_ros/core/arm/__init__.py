@@ -21,6 +21,7 @@ from flat_planner_ros.core.arm.arrays import (
     FloatArray,
     locked,
 )
+from flat_planner_ros.core.arm.clock_offset import is_noticed, OffsetFilter
 from flat_planner_ros.core.arm.counterbalance import (
     Counterbalances,
     counterbalances,
@@ -75,8 +76,8 @@ __all__ = [
     'ControlBlock',
     'coulomb_share',
     'COULOMB_VELOCITY',
-    'Counterbalances',
     'counterbalances',
+    'Counterbalances',
     'displaced_com',
     'Drive',
     'flat_map',
@@ -89,6 +90,7 @@ __all__ = [
     'InvalidCost',
     'InvalidModel',
     'InvalidRequest',
+    'is_noticed',
     'JointMerger',
     'JointSample',
     'JointStateRules',
@@ -97,6 +99,7 @@ __all__ = [
     'locked',
     'NaturalMode',
     'NotFlat',
+    'OffsetFilter',
     'OutOfReach',
     'PlanarArm',
     'PLUGINS',

@@ -12,64 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""By how much the stamps of joint states differ from the clock that they are compared with."""
+"""The clock of a motion's samples beside the clock that it was planned by."""
 
 from dataclasses import replace
-from math import inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import is_noticed
 from flat_planner_ros.core.monitor.course import Course
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion
-import numpy as np
-
-KEPT = 5.0
-"""Time for which an arrival counts at least, and at most twice [s]: a clock may be set."""
-
-NOTICED = 0.02
-"""Offset from which stamps are of another clock [s]; below it a transport is merely slow."""
-
-
-class OffsetFilter:
-    """
-    Tells how far stamps are ahead of the time of their arrival.
-
-    A transport delays some messages more than others and none less than not at all: what counts is
-    the message that came fastest of those in the last seconds.
-
-    """
-
-    def __init__(self) -> None:
-        self._since = -inf
-        self._present = -inf
-        self._former = -inf
-
-    def hear(self, stamp: float, arrival: float) -> None:
-        """Take a stamp and the time of its arrival by one's own clock [s]."""
-        if not self._since <= arrival < self._since + KEPT:
-            is_next = self._since <= arrival < self._since + 2 * KEPT
-            self._former = self._present if is_next else -inf
-            self._present = -inf
-            self._since = arrival
-        self._present = max(self._present, stamp - arrival)
-
-    def hear_all(self, stamps: FloatArray, arrivals: FloatArray) -> None:
-        """Take stamps that are `unnoticed`, shape (m,) [s]."""
-        self._present = max(self._present, float((stamps - arrivals).max()))
-
-    def unnoticed(self, stamps: FloatArray, arrivals: FloatArray) -> int:
-        """Return how many stamps in a row leave it at being no more than a slow transport."""
-        if self.offset is None or is_noticed(self.offset):
-            return 0
-        is_plain = (arrivals >= self._since) & (arrivals < self._since + KEPT)
-        is_plain &= stamps - arrivals < NOTICED
-        return int(np.append(is_plain, False).argmin())
-
-    @property
-    def offset(self) -> float | None:
-        """Return by how much stamps are ahead [s], negative for behind; None before the first."""
-        offset = max(self._present, self._former)
-        return None if offset == -inf else offset
 
 
 class SampleClock(NamedTuple):
@@ -127,8 +77,3 @@ class SampleClock(NamedTuple):
             return f'joint states arrive {late:.3g} s after their stamps' if late > 0.0 else ''
         order = 'ahead of' if ahead > 0.0 else 'behind'
         return f"joint states are stamped {abs(ahead):.4g} s {order} the plan's clock"
-
-
-def is_noticed(offset: float | None) -> bool:
-    """Return whether an offset is more than a slow transport [s]."""
-    return offset is not None and abs(offset) >= NOTICED

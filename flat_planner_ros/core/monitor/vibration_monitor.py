@@ -18,7 +18,13 @@ from dataclasses import replace
 from enum import Enum
 from math import inf, isfinite, nan
 
-from flat_planner_ros.core.arm import FloatArray, JointSample, SampleTable
+from flat_planner_ros.core.arm import (
+    FloatArray,
+    is_noticed,
+    JointSample,
+    OffsetFilter,
+    SampleTable,
+)
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.report import assess, VibrationReport
 from flat_planner_ros.core.monitor.sample_checks import (
@@ -28,7 +34,7 @@ from flat_planner_ros.core.monitor.sample_checks import (
     UNUSABLE,
 )
 from flat_planner_ros.core.monitor.settings import MonitorSettings
-from flat_planner_ros.core.monitor.stamp_offset import is_noticed, OffsetFilter, SampleClock
+from flat_planner_ros.core.monitor.stamp_offset import SampleClock
 import numpy as np
 
 SAME_CLOCK = 3600.0

@@ -21,6 +21,7 @@ from time import perf_counter
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core.arm import OffsetFilter
 from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import clock_fault, Goal, Motion, PlannerSession, Shortfall
 from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
@@ -59,6 +60,7 @@ class PlannerNode(GuardedNode):
         self._goals = GoalQueue(self, self._session, self._answer)
         self._session.source = self.resolve_topic_name(interfaces.JOINT_STATES)
         self._sent_start: float | None = None
+        self._offset = OffsetFilter()
         self._open_publishers()
         self._listen()
         efforts = self.create_publisher(
@@ -160,6 +162,9 @@ class PlannerNode(GuardedNode):
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
+        # A simulated clock is everybody's, and is heard in steps, perhaps after what it stamps.
+        if stamps.is_stamped(msg) and not stamps.is_simulated(self.get_clock()):
+            self._offset.hear(stamps.seconds(msg.header.stamp), self._now())
         for sample in self._input.samples(self._reader, msg):
             self._session.measure(sample, self._now())
         if self._reader.is_in_parts:
@@ -192,6 +197,7 @@ class PlannerNode(GuardedNode):
     def _on_jump(self, why: str, jump: float) -> None:
         """Give up what was planned for other times."""
         self._session.drop(clock_fault(why, jump))
+        self._offset = OffsetFilter()
 
     def _report_ended(self) -> None:
         """Publish how motions have ended."""
@@ -228,7 +234,7 @@ class PlannerNode(GuardedNode):
             status = diagnostics.rejected_status(error, goal)
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
             status = self._internal_error(error, goal, motion)
-        self._publish_status(status)
+        self._publish_status(diagnostics.with_clock(status, self._offset.sure))
         tell(values_of(status), status.message)
         self._report_ended()
         return status

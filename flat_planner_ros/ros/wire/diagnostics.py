@@ -37,7 +37,13 @@ from flat_planner_ros.ros.wire.interfaces import (
 )
 from flat_planner_ros.ros.wire.prediction_values import left_by_imbalance, residual_values
 from flat_planner_ros.ros.wire.stamps import time_msg
-from flat_planner_ros.ros.wire.verdict_text import clauses, list_text, precise, text_of
+from flat_planner_ros.ros.wire.verdict_text import (
+    clauses,
+    clock_clause,
+    list_text,
+    precise,
+    text_of,
+)
 
 LEVELS = {
     Level.OK: DiagnosticStatus.OK,
@@ -180,6 +186,18 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
         **({} if goal is None else _goal_values(goal)),
     }
     return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
+
+
+def with_clock(status: DiagnosticStatus, offset: float | None) -> DiagnosticStatus:
+    """Return a verdict that says how far ahead the stamps of joint states are [s], if notably."""
+    clause = clock_clause(offset)
+    if offset is None or not clause:
+        return status
+    status.message += f'; {clause}'
+    status.values.append(KeyValue(key='clock_offset', value=text_of(offset)))
+    if offset > 0.0 and status.level == DiagnosticStatus.OK:  # no network delivers ahead of time
+        status.level = DiagnosticStatus.WARN
+    return status
 
 
 def ended_status(ended: Ended, remark: str = '') -> DiagnosticStatus:

@@ -17,6 +17,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from flat_planner_ros.core.arm import is_noticed
 from flat_planner_ros.core.session import Motion
 import numpy as np
 
@@ -66,6 +67,16 @@ def told(motion: Motion) -> list[str]:
 def clauses(motion: Motion) -> str:
     """Return the same, each clause after a semicolon."""
     return ''.join(f'; {clause}' for clause in told(motion))
+
+
+def clock_clause(offset: float | None) -> str:
+    """Return how far ahead the stamps of joint states are [s], a clause; empty if hardly."""
+    if offset is None or not is_noticed(offset):
+        return ''
+    if offset > 0.0:
+        return f"joint states are stamped {offset:.3g} s ahead of the planner's clock"
+    late = f'joint states arrive {-offset:.3g} s after their stamps'
+    return f'{late} (a slow network, or another clock)'
 
 
 def values_of(status: Any) -> dict[str, str]:

@@ -18,8 +18,8 @@ from dataclasses import replace
 
 from driven_arm import driven, reports_on, sampled, START
 from flat_planner_ros.core.arm import JointSample, PlanarArm
+from flat_planner_ros.core.arm.clock_offset import KEPT, OffsetFilter
 from flat_planner_ros.core.monitor import Level, MonitorSettings, VibrationMonitor
-from flat_planner_ros.core.monitor.stamp_offset import KEPT, OffsetFilter
 import numpy as np
 import pytest
 

@@ -16,12 +16,13 @@
 
 from math import cos, pi
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core.arm import OffsetFilter
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
-from flat_planner_ros.ros.wire import interfaces, stamps
+from flat_planner_ros.ros.wire import diagnostics, interfaces, stamps
 import numpy as np
 import pytest
-from ros.rig import values
+from ros.rig import Planner, values
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -74,3 +75,49 @@ def test_the_monitor_finds_the_offset_and_the_true_amplitude(graph):
     )
     # A transport takes time, so that it can only seem less.
     assert AHEAD - 0.05 < float(values(health[-1])['stamp_minus_arrival']) <= AHEAD
+
+
+@pytest.mark.parametrize(
+    ('ahead', 'level', 'said'),
+    [
+        (0.0, DiagnosticStatus.OK, ''),
+        (0.05, DiagnosticStatus.WARN, "are stamped 0.049 s ahead of the planner's clock"),
+        (5.0, DiagnosticStatus.ERROR, "are stamped 5 s ahead of the planner's clock"),
+        (-5.0, DiagnosticStatus.ERROR, 'arrive 5 s after their stamps'),
+    ],
+)
+def test_a_verdict_says_by_how_much_clocks_differ(ahead, level, said):
+    """As the planner hears it: joint states that take 1 ms to come, then a goal."""
+    heard = OffsetFilter()
+    for time in np.arange(100.0, 101.0, 0.01).tolist():
+        heard.hear(time + ahead, time + 0.001)
+    given = DiagnosticStatus(level=min(level, DiagnosticStatus.ERROR), message='the verdict')
+    if level == DiagnosticStatus.WARN:
+        given.level = DiagnosticStatus.OK
+    status = diagnostics.with_clock(given, heard.sure)
+    assert status.level == level
+    assert said in status.message
+    assert ('clock_offset' in {pair.key for pair in status.values}) == bool(said)
+
+
+def test_a_few_late_joint_states_are_no_other_clock():
+    heard = OffsetFilter()
+    for time in range(10):
+        heard.hear(time, time + 0.1)
+    assert heard.sure is None
+
+
+def test_the_planner_says_it_in_its_verdict(graph):
+    rig = Planner(graph, {'start.joint_state_timeout': 100.0})
+    state = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0], velocity=[0.0, 0.0])
+
+    def has_heard():
+        state.header.stamp = stamps.time_msg(rig.now() + AHEAD)
+        graph.publish('/joint_states', state)
+        return rig.node._offset.sure is not None
+
+    graph.expect(has_heard, 'joint states')
+    verdict = rig.send(1.0)
+    assert verdict['level'] == DiagnosticStatus.WARN
+    assert "s ahead of the planner's clock" in verdict['message']
+    assert 0.02 < float(verdict['clock_offset']) <= AHEAD
