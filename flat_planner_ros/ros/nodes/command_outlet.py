@@ -16,7 +16,7 @@
 
 from flat_planner_ros.core.session import PlannerSession, Track
 from flat_planner_ros.ros.nodes.controller_client import ControllerClient
-from flat_planner_ros.ros.nodes.graph_watch import unheard
+from flat_planner_ros.ros.nodes.graph_watch import listeners, unheard
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
@@ -68,6 +68,12 @@ class CommandOutlet:
                 self._controller.send(command)
         self._plan.publish(plan)
         self._flat_plan.publish(conversions.flat_plan_bytes(track))
+
+    def controllers(self) -> list[str]:
+        """Return the full names of the nodes that carry out commands, as far as is known."""
+        if self._controller is None:
+            return listeners(self._node, interfaces.COMMAND)
+        return [self._controller.node_name]
 
     def close(self) -> None:
         """Leave a controller alone with what it was sent."""

@@ -67,6 +67,11 @@ class ControllerClient:
             return ''
         return f'no controller offers the action {self._name}'
 
+    @property
+    def node_name(self) -> str:
+        """Return the full name of the controller, whose actions are private by convention."""
+        return self._name.rpartition('/')[0]
+
     def send(self, command: bytes) -> None:
         """Send a serialised command; without a controller its motions fail at once."""
         self._count += 1

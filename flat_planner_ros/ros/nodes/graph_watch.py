@@ -34,14 +34,21 @@ RECORDERS = ('flat_recorder', 'rosbag2_recorder')
 """Nodes that listen to commands and carry none out."""
 
 
+def listeners(node: Node, topic: str) -> list[str]:
+    """Return the full names of the nodes that carry out what is published on a topic."""
+    infos = node.get_subscriptions_info_by_topic(node.resolve_topic_name(topic))
+    return [
+        f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        for info in infos
+        if info.node_name not in RECORDERS
+    ]
+
+
 def unheard(node: Node, *topics: str) -> str:
     """Return that nobody carries out what is published on topics, a clause; empty if one does."""
-    names = [node.resolve_topic_name(topic) for topic in topics]
-    for name in names:
-        infos = node.get_subscriptions_info_by_topic(name)
-        if any(info.node_name not in RECORDERS for info in infos):
-            return ''
-    return f'nobody listens to {" or ".join(names)}'
+    if any(listeners(node, topic) for topic in topics):
+        return ''
+    return f'nobody listens to {" or ".join(map(node.resolve_topic_name, topics))}'
 
 
 class GraphWatch:

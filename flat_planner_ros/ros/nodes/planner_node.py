@@ -26,6 +26,7 @@ from flat_planner_ros.core.planning import Reason, RequestRejected
 from flat_planner_ros.core.session import clock_fault, Goal, Motion, PlannerSession, Shortfall
 from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
 from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
+from flat_planner_ros.ros.nodes.controller_check import ControllerCheck
 from flat_planner_ros.ros.nodes.early_loading import load_early, PLANNING
 from flat_planner_ros.ros.nodes.effort_stream import EffortStream
 from flat_planner_ros.ros.nodes.goal_queue import GoalQueue, Read, Tell, tell_nobody
@@ -83,6 +84,7 @@ class PlannerNode(GuardedNode):
         self._watch = GraphWatch(
             self, self._log, commands, [interfaces.JOINT_STATES], is_listening=True
         )
+        self._check = ControllerCheck(self, self._log, self._outlet.controllers)
         self._input = JointStateInput(self._log, self._watch, self._now)
         self._clocks = ClockWatch(self, self._on_jump, self._report_ended)
         self._apply(self._settings)

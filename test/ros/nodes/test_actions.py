@@ -23,6 +23,7 @@ from flat_planner_ros.ros.wire.message_types import UnknownType
 import numpy as np
 import pytest
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.node import Node
 from ros.control_messages import make_control_messages
 from ros.rig import goal
 from ros.timed_planner import Timed
@@ -309,6 +310,20 @@ def test_planned_only_it_does_not_succeed(world, action):
     status, code, words = rig.result()
     assert (status, code) == (ABORTED, -1)
     assert 'execute is false' in words
+
+
+def test_a_controller_that_forgets_stamps_is_warned_of(graph):
+    for name, is_true in (('good_controller', False), ('bad_controller', True)):
+        options = {'context': graph.context, 'use_global_arguments': False}
+        controller = graph.add(Node(name, **options))
+        controller.declare_parameter('allow_trajectory_replacement', is_true)
+        controller.create_subscription(
+            JointTrajectory, '/flat_planner/joint_trajectory', lambda _: None, 10
+        )
+    graph.create(PlannerNode)
+    graph.expect(lambda: graph.logged('allow_trajectory_replacement'), 'a warning')
+    (warning,) = graph.logged('allow_trajectory_replacement')
+    assert warning.startswith('/bad_controller: ')
 
 
 def test_without_control_msgs_there_are_no_actions_and_one_line_says_so(graph, monkeypatch):

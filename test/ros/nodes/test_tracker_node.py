@@ -69,7 +69,7 @@ class Tracked(Rig):
         self.wait_until(stamp(self.states[-1]) + duration)
 
     def move_until_rivals_meet(self, *positions):
-        """Move until a tracker leaves it to another; return where to, one may not hear at first."""
+        """Move until a tracker leaves it to another, which may not hear at first; return where."""
         for position in positions:
             self.move(position)
             self.graph.spin_until(lambda: self.has_met() or stamp(self.states[-1]) > self.end)
