@@ -59,6 +59,7 @@ MESSAGES_ALLOWED = {
     'model_adoption.py': 'hears reports and answers a service for the planner node',
     'row.py': 'descriptors of parameters, from rcl_interfaces',
     'node_parameters.py': 'verdicts on changed parameters, from rcl_interfaces',
+    'joint_state_input.py': 'hears joint states for every node',
     'controller_check.py': 'asks a controller for parameters, from rcl_interfaces',
     'rest_services.py': 'answers two services for the planner node',
     'follow_joint_trajectory.py': 'the same as conversions.py for an action',
