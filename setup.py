@@ -63,6 +63,8 @@ setup(
             'control>=0.10,<0.11',
             'drake>=1.30,<2; sys_platform == "linux" and platform_machine == "x86_64"',
             'matplotlib>=3.6,<4',
+            'ruckig>=0.9,<1',
+            'toppra>=0.6,<1',
         ],
         # Second opinions on the URDF; tests that want one of them are skipped without it.
         'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],

@@ -35,12 +35,22 @@ BENCHMARKS = (
     'stream',
     'via_points',
     'duration',
+    'peak',
     'model_fit',
     'tracking',
 )
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = ('planning', 'scaling', 'stream', 'via_points', 'duration', 'model_fit', 'tracking')
+WITHOUT_ROS = (
+    'planning',
+    'scaling',
+    'stream',
+    'via_points',
+    'duration',
+    'peak',
+    'model_fit',
+    'tracking',
+)
 """Those that need no ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'
@@ -49,7 +59,17 @@ RESULTS = Path(__file__).parent / 'results.md'
 THREADS = ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS', 'BLIS_NUM_THREADS')
 """Variables that keep linear algebra to one thread; read when NumPy is imported."""
 
-VERSIONS = ('numpy', 'scipy', 'casadi', 'drake', 'control', 'matplotlib', 'rclpy')
+VERSIONS = (
+    'numpy',
+    'scipy',
+    'casadi',
+    'drake',
+    'control',
+    'ruckig',
+    'toppra',
+    'matplotlib',
+    'rclpy',
+)
 """Packages that are named in the results."""
 
 

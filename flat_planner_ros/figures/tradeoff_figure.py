@@ -17,8 +17,14 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from flat_planner_ros.core.planning import TradeoffPoint
+from flat_planner_ros.core.planning import (
+    FASTEST,
+    FASTEST_INSENSITIVE,
+    FASTEST_WITHIN,
+    TradeoffPoint,
+)
 from flat_planner_ros.figures.file_plot import plt
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 MARKS = {
@@ -31,13 +37,25 @@ MARKS = {
 }
 """Mark and name of each single motion."""
 
+FASTEST_MARKS = {
+    FASTEST: ('*', FASTEST),
+    FASTEST_INSENSITIVE: ('P', FASTEST_INSENSITIVE),
+}
+"""The same of the shortest motions of least peak."""
+
 LINES = {'insensitive_exact': '-', 'insensitive_free': '--'}
 """Line of each sweep; its colour tells the duration."""
 
 
-def draw(points: Sequence[TradeoffPoint], box: str, path: Path) -> None:
+def draw(
+    points: Sequence[TradeoffPoint],
+    box: str,
+    path: Path,
+    fastest: Sequence[TradeoffPoint] = (),
+    limit: float = 0.0,
+) -> None:
     """
-    Draw the worst residual over the RMS effort, both logarithmic.
+    Draw the worst residual over the RMS effort, and over the time that a limit asks for.
 
     Parameters
     ----------
@@ -47,9 +65,24 @@ def draw(points: Sequence[TradeoffPoint], box: str, path: Path) -> None:
         The uncertainty in words.
     path
         File to write; its suffix chooses the format.
+    fastest
+        Shortest motions within a limit on the effort; without them there is one picture.
+    limit
+        That limit [N m].
 
     """
-    figure, axis = plt.subplots(figsize=(9.0, 6.0))
+    columns = 2 if fastest else 1
+    figure, axes = plt.subplots(1, columns, figsize=(7.0 * columns + 2.0, 6.0), squeeze=False)
+    _draw_efforts(axes[0, 0], points, box)
+    if fastest:
+        _draw_times(axes[0, 1], fastest, limit)
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def _draw_efforts(axis: Axes, points: Sequence[TradeoffPoint], box: str) -> None:
+    """Draw the worst residual over the RMS effort, both logarithmic."""
     durations = sorted({point.duration for point in points if point.weight > 0.0})
     shades = plt.get_cmap('viridis')
     colours = {
@@ -88,6 +121,31 @@ def draw(points: Sequence[TradeoffPoint], box: str, path: Path) -> None:
     ]
     axis.add_artist(axis.legend(handles=marks, fontsize=8, loc='lower right'))
     axis.legend(handles=handles, fontsize=8, loc='upper right')
-    figure.tight_layout()
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
+
+
+def _draw_times(axis: Axes, fastest: Sequence[TradeoffPoint], limit: float) -> None:
+    """Draw the worst residual over the shortest duration within a limit."""
+    bounded = sorted(
+        (point for point in fastest if point.series in (FASTEST, FASTEST_WITHIN)),
+        key=lambda point: point.duration,
+    )
+    axis.plot(
+        [point.duration for point in bounded],
+        [point.worst for point in bounded],
+        '.-',
+        color='C0',
+        label=f'{FASTEST}, peak.max_residual',
+    )
+    for point in fastest:
+        if point.series == FASTEST_WITHIN:
+            continue
+        mark, name = FASTEST_MARKS.get(point.series) or MARKS[point.series]
+        axis.plot(
+            point.duration, point.worst, mark, color='C3', label=name, zorder=3, linestyle='none'
+        )
+    axis.set_yscale('log')
+    axis.set_xlabel(f'shortest duration within {limit:.4g} N m [s]')
+    axis.set_ylabel('worst residual amplitude [rad]')
+    axis.set_title('As fast as the motor allows', fontsize=10)
+    axis.grid(alpha=0.3, which='both')
+    axis.legend(fontsize=8, loc='best')

@@ -77,6 +77,18 @@ STRATEGIES = (
 )
 """Those of the paper, which the trade is compared with."""
 
+FASTEST = Strategy.MIN_PEAK_EFFORT.value
+"""Series of the shortest motion."""
+
+FASTEST_INSENSITIVE = f'{FASTEST}, insensitive'
+"""The same with a vanishing derivative of the residual."""
+
+FASTEST_WITHIN = f'{FASTEST}, residual bounded'
+"""Series of the shortest motions within less and less of its worst residual."""
+
+SHARES = (0.7, 0.4, 0.2, 0.1, 0.05, 0.02)
+"""Of that residual [-]."""
+
 WEIGHTS = tuple(10.0 ** (0.125 * step) for step in range(8, 29))
 """Weights of a sweep, from nearly the least effort to nearly the least residual."""
 
@@ -307,26 +319,31 @@ def fastest_points(
     effort[-2] = limit
     limits = JointLimits.of(arm.n, effort=effort)
     peak = replace(options, strategy=Strategy.MIN_PEAK_EFFORT)
+    plain = replace(options.peak, insensitive=False, max_residual=0.0)
+    fastest = replace(peak, peak=plain)
     wanted = {
         **{strategy.value: replace(options, strategy=strategy) for strategy in STRATEGIES},
-        Strategy.MIN_PEAK_EFFORT.value: peak,
-        f'{Strategy.MIN_PEAK_EFFORT.value}, insensitive': replace(
-            peak, peak=replace(options.peak, insensitive=True)
-        ),
+        FASTEST: fastest,
+        FASTEST_INSENSITIVE: replace(peak, peak=replace(plain, insensitive=True)),
     }
-    shortest, longest = DURATIONS
-    points = []
-    for name, chosen in wanted.items():
+
+    def shortest(name: str, chosen: PlanningOptions) -> TradeoffPoint:
+        """Return the shortest motion with some options."""
         found = shortest_plan(
-            lambda duration, chosen=chosen: plan(  # type: ignore[misc]
-                request.stretched(duration), arm, chosen
-            ),
+            lambda duration: plan(request.stretched(duration), arm, chosen),
             limits,
-            shortest=shortest,
-            longest=longest,
+            shortest=DURATIONS[0],
+            longest=DURATIONS[1],
             bound=shortest_known(request, arm, chosen, limit),
         )
-        points.append(_point_of(name, found))
+        return _point_of(name, found)
+
+    points = [shortest(name, chosen) for name, chosen in wanted.items()]
+    worst = next(point.worst for point in points if point.series == FASTEST)
+    # What less of the residual costs in time.
+    for share in SHARES:
+        bounded = replace(plain, max_residual=share * worst, box=options.insensitivity.box)
+        points.append(shortest(FASTEST_WITHIN, replace(peak, peak=bounded)))
     return tuple(points)
 
 

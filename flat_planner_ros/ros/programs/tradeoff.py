@@ -63,6 +63,7 @@ STRETCHES = (1.0, 1.1, 1.25, 1.5)
 EXAMPLES = """\
 examples:
   tradeoff joint1=3.14 --duration 1 --plot tradeoff.png
+  tradeoff joint1=3.14 --duration 1 --max-effort 0.015 --plot fastest.png
   tradeoff joint1=1.5 --params-file arm.yaml --duration 0.8 --csv tradeoff.csv
   tradeoff joint1=3.14 --duration 1 --stretch 1 1.05 -p insensitivity.stiffness:=0.2
 """
@@ -89,12 +90,16 @@ def main(args: Sequence[str] | None = None) -> int:
                 for point in fastest:
                     print(_line(point))
         if options.csv is not None:
-            _write_csv(points, options.csv)
+            _write_csv([*points, *fastest], options.csv)
         if options.plot is not None:
             # Imported here: matplotlib is an extra.
             from flat_planner_ros.figures.tradeoff_figure import draw
 
-            write_through(options.plot, lambda path: draw(points, box, path), '.png')
+            write_through(
+                options.plot,
+                lambda path: draw(points, box, path, fastest, options.max_effort or 0.0),
+                '.png',
+            )
             print(f'figure: {options.plot}', file=sys.stderr)
     except FlatPlannerError as error:
         print(f'tradeoff: {error}', file=sys.stderr)
@@ -151,7 +156,7 @@ def _options(args: Sequence[str] | None) -> Namespace:
         '--max-effort',
         metavar='N_M',
         type=number_above_zero,
-        help='also print the shortest motion of each strategy within this effort',
+        help='also show the shortest motions within this effort, and what they leave',
     )
     parser.add_argument(
         '--stretch',
@@ -211,8 +216,8 @@ def _points(
 def _print(points: Sequence[TradeoffPoint], box: str) -> None:
     """Print what is no sweep, and the nearest of each sweep to it."""
     print(f'worst residual over {box}')
-    print(f' {"method":<28} | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]')
-    print('+'.join('-' * width for width in (30, 14, 18, 15, 12)))
+    print(' x | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]')
+    print('+'.join('-' * width for width in (35, 14, 18, 15, 12)))
     for point in points:
         if point.weight == 0.0:
             print(_line(point))
@@ -235,7 +240,7 @@ def _print(points: Sequence[TradeoffPoint], box: str) -> None:
 def _line(point: TradeoffPoint) -> str:
     """Return a row of the table."""
     return (
-        f' {point.series:<28} | {point.duration:<12.4g} | {point.rms_effort:<16.4g} | '
+        f' {point.series:<33} | {point.duration:<12.4g} | {point.rms_effort:<16.4g} | '
         f'{point.nominal:<13.2g} | {point.worst:.4g}'
     )
 

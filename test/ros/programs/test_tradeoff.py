@@ -45,14 +45,24 @@ def test_numbers_and_a_picture(tmp_path, capsys):
     assert 'zvd_quintic' in capsys.readouterr().out
 
 
-def test_the_shortest_within_an_effort(capsys):
-    assert tradeoff.main([*MOTION, '--max-effort', '0.015']) == 0
+def test_the_shortest_within_an_effort(tmp_path, capsys):
+    pytest.importorskip('matplotlib')
+    numbers, picture = tmp_path / 'fastest.csv', tmp_path / 'fastest.png'
+    arguments = [*MOTION, '--max-effort', '0.015', '--csv', str(numbers)]
+    assert tradeoff.main([*arguments, '--plot', str(picture)]) == 0
     said = capsys.readouterr().out
     shortest = said.partition('shortest within 0.015 N m:')[2].splitlines()
     durations = {row.split('|')[0].strip(): row.split('|')[1] for row in shortest if '|' in row}
     assert float(durations['min_peak_effort']) == pytest.approx(0.845, abs=1e-3)
     assert float(durations['min_peak_effort, insensitive']) == pytest.approx(1.039, abs=1e-3)
     assert float(durations['min_control_effort']) > 0.94
+    within = [row for row in rows(numbers) if row['series'] == 'min_peak_effort, residual bounded']
+    by_residual = sorted(within, key=lambda row: float(row['worst']))
+    times = [float(row['duration']) for row in by_residual]
+    assert len(times) == 6
+    assert times == sorted(times, reverse=True)
+    assert all(float(row['peak_effort']) <= 0.015 for row in within)
+    assert picture.stat().st_size > 20_000
 
 
 def test_parameters_decide(tmp_path):
