@@ -237,7 +237,7 @@ class PeakProblem:
         of_bounds = tuple(np.split(solution.cap_multipliers, edges)[: len(self.caps)])
         # No effort is less than the one that acts at the start.
         first = abs(self.first_drive)
-        proven = max(self.programme.proven_peak(solution), first)
+        proven = max(solution.proven_peak, first)
         return PeakMotion(
             problem=self,
             samples=self.spline.samples(coefficients),

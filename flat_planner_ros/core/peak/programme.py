@@ -48,12 +48,15 @@ class PeakSolution(NamedTuple):
         Dual values p of the conditions, up to a common factor, shape (r,).
     cap_multipliers
         Those of the bounded quantities, up to the same factor, none negative, shape (s,).
+    proven_peak
+        Peak below which no coefficients meet the conditions, by the dual values.
 
     """
 
     coefficients: FloatArray
     multipliers: FloatArray
     cap_multipliers: FloatArray
+    proven_peak: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,7 +106,8 @@ class PeakProgramme:
             return None
         # The inverse of a vertex leaves its condition number of roundings.
         share = found.values + rows.T @ (target * found.gain - rows @ found.values)
-        return PeakSolution(share / found.gain, found.multipliers, np.zeros(0))
+        proven = self._proven_peak(rows, target, found.multipliers, np.zeros(0))
+        return PeakSolution(share / found.gain, found.multipliers, np.zeros(0), proven)
 
     def _by_general_solver(self, rows: FloatArray, target: FloatArray) -> PeakSolution | None:
         """Return the same with bounded quantities, by HiGHS."""
@@ -138,8 +142,16 @@ class PeakProgramme:
         share[free] += change[:-1]
         least += float(change[-1])
         share += rows.T @ (target * least - rows @ share)
-        of_caps = -found.ineqlin.marginals / cap_sizes
-        return PeakSolution(share / least, found.eqlin.marginals, of_caps)
+        duals, of_caps = found.eqlin.marginals, -found.ineqlin.marginals / cap_sizes
+        # The same for the dual values: a coefficient within its bounds is worth nothing.
+        active = of_caps > 0.0
+        worth = np.concatenate([rows[:, free], -self.caps[active][:, free]])
+        values = np.append(duals, of_caps[active])
+        values -= np.linalg.lstsq(worth.T, values @ worth, rcond=RANK)[0]
+        duals = values[: len(duals)]
+        of_caps[active] = np.maximum(values[len(duals) :], 0.0)
+        proven = self._proven_peak(rows, target, duals, of_caps)
+        return PeakSolution(share / least, duals, of_caps, proven)
 
     @property
     def _sizes(self) -> FloatArray:
@@ -147,8 +159,9 @@ class PeakProgramme:
         sizes: FloatArray = np.linalg.norm(self.rows, axis=1)
         return sizes
 
-    def proven_peak(self, solution: PeakSolution) -> float:
-        """Return the peak below which no coefficients meet the conditions, by dual values."""
-        p, of_caps = solution.multipliers, solution.cap_multipliers
-        gain = p @ self.target + of_caps @ (self.cap_target - self.cap_limits)
-        return float(gain / np.abs(p @ self.rows - of_caps @ self.caps).sum())
+    def _proven_peak(
+        self, rows: FloatArray, target: FloatArray, p: FloatArray, of_caps: FloatArray
+    ) -> float:
+        """Return what multipliers prove, in orthonormal rows: there they cancel least."""
+        gain = p @ target + of_caps @ (self.cap_target - self.cap_limits)
+        return float(gain / np.abs(p @ rows - of_caps @ self.caps).sum())

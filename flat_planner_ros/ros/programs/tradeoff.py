@@ -216,7 +216,8 @@ def _points(
 def _print(points: Sequence[TradeoffPoint], box: str) -> None:
     """Print what is no sweep, and the nearest of each sweep to it."""
     print(f'worst residual over {box}')
-    print(' x | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]')
+    head = ' | duration [s] | RMS effort [N m] | nominal [rad] | worst [rad]'
+    print(' ' + 'method'.ljust(33) + head)
     print('+'.join('-' * width for width in (35, 14, 18, 15, 12)))
     for point in points:
         if point.weight == 0.0:

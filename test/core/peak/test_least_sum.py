@@ -76,4 +76,4 @@ def test_where_it_goes_round_the_general_solver_takes_over():
     peak = np.abs(found.coefficients).max()
     np.testing.assert_allclose(rows @ found.coefficients, target, atol=1e-12)
     assert peak == pytest.approx(1.0 / by_highs(rows, target), rel=1e-9)
-    assert programme.proven_peak(found) == pytest.approx(peak, rel=1e-9)
+    assert found.proven_peak == pytest.approx(peak, rel=1e-9)
