@@ -92,9 +92,6 @@ class Course:
 class Bound(Protocol):
     """A bound besides that on the peak."""
 
-    def everywhere(self) -> 'Bound':
-        """Return the same in as many places as any course from rest has."""
-
     def caps(self, course: Course) -> Caps:
         """Return it in the coefficients of the drive."""
 
@@ -118,10 +115,6 @@ class RateBound:
     """
 
     limit: float
-
-    def everywhere(self) -> 'RateBound':
-        """Return the same."""
-        return self
 
     def caps(self, course: Course) -> Caps:
         """Return the differences of neighbours."""
@@ -150,8 +143,7 @@ class VelocityBound:
     limit
         For a motion over 1 rad [rad/s].
     signs
-        Direction in which each of `Course.halves` is bounded, 0 for none, shape (m,); shape (1,)
-        for that of all.
+        Direction in which each of `Course.halves` is bounded, 0 for none, shape (m,).
     margin
         Share of it that is kept in reserve [-].
 
@@ -161,15 +153,10 @@ class VelocityBound:
     signs: FloatArray
     margin: float = 0.0
 
-    def everywhere(self) -> 'VelocityBound':
-        """Return the same in the direction of the way."""
-        return VelocityBound(limit=self.limit, signs=np.ones(1))
-
     def caps(self, course: Course) -> Caps:
         """Return the velocities."""
-        mode, every = course.mode, self._signs(course)
-        bounded = every != 0.0
-        signs = every[bounded]
+        mode, bounded = course.mode, self.signs != 0.0
+        signs = self.signs[bounded]
         rows = signs[:, None] * _velocity_rows(course, bounded)
         free = course.state.swing * np.exp(mode.pole * course.halves[bounded])
         start = signs * (course.state.sigma_rate + mode.reaction * mode.jerk(free))
@@ -205,14 +192,9 @@ class VelocityBound:
         values: FloatArray = mode.gain * rate + mode.reaction * mode.jerk(mode.swing_gain * swing)
         return np.where(times < edges[-1], values, 0.0)
 
-    def _signs(self, course: Course) -> FloatArray:
-        """Return the direction at every place."""
-        signs: FloatArray = np.broadcast_to(self.signs, course.halves.shape)
-        return signs
-
     def _spread(self, course: Course, multipliers: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return multipliers per time around each place, and the edges between them."""
-        signs, places = self._signs(course), course.halves
+        signs, places = self.signs, course.halves
         signed = np.zeros(len(places))
         signed[signs != 0.0] = signs[signs != 0.0] * multipliers
         middles = 0.5 * (places[:-1] + places[1:])
@@ -244,10 +226,6 @@ class ResidualBound:
     phases: FloatArray
     limit: float
     margin: float = 0.0
-
-    def everywhere(self) -> 'ResidualBound':
-        """Return the same."""
-        return self
 
     def caps(self, course: Course) -> Caps:
         """Return the parts of the residuals."""

@@ -16,7 +16,7 @@
 Simplex method for the least sum of magnitudes: the dual of the least peak.
 
 It has as few unknowns as a motion has conditions, so a vertex is a handful of zeros of the
-switching function, and one line search passes many of them ((B6a) of docs/derivation.md).
+switching function, and one line search passes many of them ((B6c) of docs/derivation.md).
 """
 
 from typing import NamedTuple

@@ -25,7 +25,6 @@ from math import ceil, inf, pi
 from flat_planner_ros.core.arm import FloatArray, OutOfReach
 from flat_planner_ros.core.peak.bound import SwitchingFunction
 from flat_planner_ros.core.peak.bounds import Bound, Caps, Course
-from flat_planner_ros.core.peak.bracket import between, Tried
 from flat_planner_ros.core.peak.driven_mode import DrivenMode, ModeState
 from flat_planner_ros.core.peak.effort_spline import EffortSpline
 from flat_planner_ros.core.peak.law import LinearEffortLaw
@@ -61,8 +60,11 @@ BACK_STRIDE = 1.2
 MOST_PIECES = 1000
 """Most pieces of a drive with bounds for which durations are tried."""
 
-BOUND_STEPS = 6
+BOUND_STEPS = 8
 """Durations that are tried for one that dual values rule out within bounds."""
+
+BOUND_STRIDE = 0.01
+"""Step between the first ones, relative to them [-]."""
 
 NODES_PER_PIECE = 3
 """Gauss-Legendre nodes on each piece, over which a switching function with bounds is summed."""
@@ -374,36 +376,24 @@ class PeakMotion:
             return least
         # No link goes further than at full speed all the time.
         least = max(least, problem.distance / problem.settings.velocity)
-        if problem.course.pieces > MOST_PIECES:
+        if problem.course.pieces > MOST_PIECES or problem.idle[1] > 0:
             return least
         return max(least, self._least_duration_within())
 
     def _least_duration_within(self) -> float:
         """Return the same within the bounds: the longest of the durations tried and ruled out."""
-        low = Tried(0.0, inf)
-        high = Tried(self.problem.duration, self.least_peak / self.peak)
-        ruled_out = 0.0
-        # Whatever the spline, what its dual values prove holds for every drive.
-        problem = replace(
-            self.problem,
-            bounds=tuple(bound.everywhere() for bound in self.problem.bounds),
-            least_intervals=0,
-            idle=(0, 0),
-        )
+        # Bounds belong to the intervals of this spline.
+        problem = replace(self.problem, least_intervals=self.problem.spline.intervals)
+        high, low = problem.duration, 0.0
         for _ in range(BOUND_STEPS):
-            duration = between(low, high, 0.0)
+            # Not far below: near what no spline can do, its dual values prove little.
+            duration = 0.5 * (low + high) if low else (1.0 - BOUND_STRIDE) * high
             try:
-                share = problem.lasting(duration).motion().least_peak / self.peak
+                is_ruled_out = problem.lasting(duration).motion().least_peak >= self.peak
             except OutOfReach:
-                # Not by a spline: that proves nothing of other drives.
-                share = inf
-            if share < 1.0:
-                high = Tried(duration, share)
-                continue
-            low = Tried(duration, share)
-            if share < inf:
-                ruled_out = duration
-        return ruled_out
+                break
+            low, high = (duration, high) if is_ruled_out else (low, duration)
+        return low
 
     def next_duration(self, peak: float) -> float:
         """

@@ -40,13 +40,13 @@ ROUNDS = 12
 FIRST_MARGIN = 2e-3
 """Share of the velocity that is kept in reserve between the places of its bound, at first [-]."""
 
-CRUISE_TURNS = 1.5
+CRUISE_TURNS = 2.0
 """Turns of the oscillation that a motion may take to come to full speed without a swing [-]."""
 
-LONGEST_RAMPS = 0.8
+LONGEST_RAMPS = 0.3
 """Share of the duration up to which both ends are solved for alone [-]."""
 
-ZONE_INTERVALS = 30
+ZONE_INTERVALS = 40
 """Spline intervals of each of them."""
 
 NEAR = 0.4
