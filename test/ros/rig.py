@@ -153,8 +153,12 @@ class Rig:
         def answered():
             return [s for s in self.status[seen:] if values(s).get('state') in ANSWERS]
 
-        self.graph.publish(self.namespace + topic, message, interfaces.BURST)
-        self.graph.expect(answered, 'a verdict')
+        # Of a planner that was killed, the reader stays listed; its successor's may come late.
+        for _ in range(ATTEMPTS):
+            self.graph.publish(self.namespace + topic, message, interfaces.BURST)
+            if self.graph.spin_until(answered, TIMEOUT / ATTEMPTS):
+                break
+        self.graph.expect(answered, 'a verdict', 0.0)
         verdict = answered()[0]
         status = verdict.status[0]
         return {**values(verdict), 'message': status.message, 'level': status.level}
