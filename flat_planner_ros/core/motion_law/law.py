@@ -222,10 +222,7 @@ def half_quadrature(rates: ComplexArray) -> tuple[FloatArray, FloatArray]:
         Normalised times x + 1 in (0, 1), and weights whose sum is 1, shape (m,) [-].
 
     """
-    depth = ceil(log2(np.abs(rates).max() + 1.0)) + 1
-    # Halved towards the start as deep as layers go, even where the law is slow.
-    layers = 0.5 ** np.arange(depth, 0.0, -1.0)
-    edges = np.union1d(layers, np.linspace(0.0, 1.0, MIN_PANELS + 1))
+    edges = _panels(ceil(log2(np.abs(rates).max() + 1.0)) + 1)
     # A term may oscillate many times within its layer: split panels that it still reaches.
     is_alive = np.multiply.outer(edges[:-1], np.abs(rates.real)) < NEGLIGIBLE_DECAY
     turns = np.diff(edges) * np.where(is_alive, np.abs(rates), 0.0).max(axis=1)
@@ -272,6 +269,14 @@ def motion_quadrature(
         times += [start + reach - begin, end - reach - begin]
         weights += 2 * [0.5 * share * halves]
     return np.concatenate(times), np.concatenate(weights)
+
+
+@cache
+def _panels(depth: int) -> FloatArray:
+    """Return edges of panels, halved towards the start as deep as layers go."""
+    layers = 0.5 ** np.arange(depth, 0.0, -1.0)
+    # Some there are even where the law is slow.
+    return locked(np.union1d(layers, np.linspace(0.0, 1.0, MIN_PANELS + 1)))
 
 
 @cache
