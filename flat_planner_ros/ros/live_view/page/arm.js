@@ -45,7 +45,7 @@ export function drawArm(canvas, {joints, lengths, measured, reference, goal, typ
   drawTrail(c, trail.map(angles => pixels(angles).at(-1)), colour(`--s${(joints - 1) % 6}`));
   if (way) drawWay(c, way.map(angles => pixels(angles).at(-1)));
   if (goal) drawLinks(c, pixels(goal), {dashes: [5, 5]});
-  if (typed) drawLinks(c, pixels(typed), {dashes: [1.5, 5], colour: '--accent'});
+  for (const pose of typed) drawLinks(c, pixels(pose), {dashes: [1.5, 5], colour: '--accent'});
   if (reference) drawLinks(c, pixels(reference), {shadow: true});
   if (measured) drawLinks(c, pixels(measured), {});
   if (pull && measured) drawPull(c, pixels(measured).at(-1), pull);

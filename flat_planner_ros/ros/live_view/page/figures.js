@@ -59,8 +59,8 @@ function opposite(limits) { return limits?.map(value => value === null ? null : 
 
 // Limits of joints; null where there is none.
 function bounds(joints, least, most) {
-  return joints.flatMap((_, k) => [[least, -1], [most, 1]]
-    .map(([limits, side]) => ({value: limits?.[k] ?? null, side, colour: tint(k)}))
+  return joints.flatMap((_, k) => [least, most]
+    .map(limits => ({value: limits?.[k] ?? null, colour: tint(k)}))
     .filter(({value}) => value !== null));
 }
 

@@ -7,6 +7,7 @@ const PRESETS = [['−π', -Math.PI], ['−π/2', -Math.PI / 2], ['0', 0], ['π/
 const SLIDER = {reach: 2 * Math.PI, step: 0.01};   // [rad]
 const ANGLE_REMARK = 'an angle, please: 1.57, 90° or pi/2';
 const MOST_VIA = 16;
+const HERE = 0.005;   // [rad] within which a pose is where the arm is
 
 const readAngle = input => readField(input, angle, ANGLE_REMARK);
 const readNumber = input => readField(input, number, 'a number, please');
@@ -104,7 +105,7 @@ export class GoalForm {
 
   halfWay() {
     const here = this.measured() ?? [];
-    return this.inputs.map((input, k) => ((here[k] ?? 0) + (angle(input.value) ?? 0)) / 2);
+    return this.inputs.map((input, k) => Number((((here[k] ?? 0) + (angle(input.value) ?? 0)) / 2).toFixed(2)));
   }
 
   // ---- what the form states
@@ -136,13 +137,13 @@ export class GoalForm {
     showAnswer($('goal-answer'), this.send({do: 'goal', ...goal}));
   }
 
-  // The pose that is typed, null where it is none or where the arm is.
+  // The poses that are typed, via points first, but for those that are none, and where the arm is.
   typed() {
-    const angles = this.inputs.map(input => angle(input.value));
-    if (!angles.length || angles.includes(null)) return null;
     const here = this.measured() ?? [];
-    const is_here = angles.every((value, k) => Math.abs(value - here[k]) < 0.005);
-    return is_here ? null : [...angles, 0];
+    const poses = [...this.vias.map(field => [...field.querySelectorAll('[name]')]), this.inputs]
+      .map(inputs => inputs.map(input => angle(input.value)))
+      .filter(angles => angles.length && !angles.includes(null));
+    return poses.filter(angles => angles.some((value, k) => Math.abs(value - here[k]) > HERE)).map(angles => [...angles, 0]);
   }
 
   // ---- the last goal

@@ -4,7 +4,7 @@ import {within} from './store.js';
 import {minus} from './words.js';
 
 const GAP = 0.25;      // [s] between two rows that no line bridges
-const PAD = {left: 52, right: 8, second: 48, top: 6, bottom: 18};
+const PAD = {left: 52, right: 8, second: 54, top: 6, bottom: 18};
 const NARROWING = 0.04;   // share of the way by which a range narrows at each drawing
 const NEAR = 1;           // bounds this near to what is shown, in terms of its range, are shown, too
 const DENSE = 2;          // rows per pixel from which only their extremes are drawn
@@ -196,15 +196,11 @@ export class Plot {
     c.globalAlpha = 1;
   }
 
-  // A limit: a dashed line, and a pale ground beyond it. One without a colour only widens the range.
-  bound(c, {value, colour: name, side}, low, high) {
+  // A limit; one without a colour only widens the range.
+  bound(c, {value, colour: name}, low, high) {
     if (!name || value < low || value > high) return;
     const {box, Y} = this;
-    const edge = side > 0 ? box.y : box.y + box.h;
-    c.fillStyle = c.strokeStyle = colour(name);
-    c.globalAlpha = 0.08;
-    c.fillRect(box.x, Math.min(edge, Y(value)), box.w, Math.abs(Y(value) - edge));
-    c.globalAlpha = 1;
+    c.strokeStyle = colour(name);
     this.stroke(c, [[box.x, Y(value)], [box.x + box.w, Y(value)]], [7, 4]);
   }
 
