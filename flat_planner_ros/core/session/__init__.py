@@ -15,12 +15,8 @@
 """Session: goals and measurements in, motions and verdicts out, in the order of time."""
 
 from flat_planner_ros.core.session.execution import Astray, clock_fault, Ended, Outcome, Shortfall
-from flat_planner_ros.core.session.goal import (
-    check_point_count,
-    Goal,
-    GoalPoint,
-    path_goal,
-)
+from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint
+from flat_planner_ros.core.session.path_goal import path_goal
 from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import (
     ReplanFrom,

@@ -140,26 +140,6 @@ def checked_goal(goal: Goal, joints: Sequence[str]) -> Goal:
     )
 
 
-def path_goal(goal: Goal) -> Goal:
-    """
-    Return the goal to pass the points of a trajectory that a motion planner has made.
-
-    Its velocities and accelerations on the way are those of another law, and its points are many:
-    both are left out as far as no goal can have them, which the remarks say.
-    """
-    first = 1 if goal.begins_with_start else 0
-    way = [replace(point, velocities=(), accelerations=()) for point in goal.points[first:-1]]
-    remarks = []
-    if any(any(point.velocities + point.accelerations) for point in goal.points[first:-1]):
-        remarks.append('its velocities and accelerations on the way are left to the planner')
-    room = MAX_POINTS - 1 - first
-    if len(way) > room:
-        remarks.append(f'{room} of its {len(way)} points on the way are passed')
-        way = [way[(2 * k + 1) * len(way) // (2 * room)] for k in range(room)]
-    points = (*goal.points[:first], *way, *goal.points[-1:])
-    return replace(goal, points=points, remarks=tuple(remarks))
-
-
 def check_point_count(count: int) -> None:
     """Refuse more points than any goal may have."""
     if count > MAX_POINTS:
