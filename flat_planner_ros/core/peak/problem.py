@@ -227,7 +227,7 @@ class PeakProblem:
         """Return the motion with its certificate."""
         solution = self.programme.solve()
         if solution is None:
-            raise self._refusal()
+            raise self.refusal()
         coefficients = np.zeros(self.spline.size)
         coefficients[0] = self.first_drive
         coefficients[self._free] = solution.coefficients
@@ -285,7 +285,7 @@ class PeakProblem:
         magnitude = float(np.abs(values).reshape(pieces, -1).sum(axis=0) @ _SHARES)
         return gain / (0.5 * step * magnitude)
 
-    def _refusal(self) -> OutOfReach:
+    def refusal(self) -> OutOfReach:
         """Return the refusal of a motion that is too short for its bounds."""
         wanted = self.settings
         return OutOfReach(

@@ -34,8 +34,8 @@ from flat_planner_ros.core.peak.bounds import (
 from flat_planner_ros.core.peak.problem import MOST_INTERVALS, PeakMotion, PeakProblem
 import numpy as np
 
-ROUNDS = 12
-"""Programmes after which a motion is taken as it is."""
+ROUNDS = 20
+"""Programmes after which bounds are given up."""
 
 FIRST_MARGIN = 2e-3
 """Share of the velocity that is kept in reserve between the places of its bound, at first [-]."""
@@ -93,9 +93,9 @@ def motion_within(problem: PeakProblem, oscillator: Oscillator) -> PeakMotion:
     residual = _Residual(problem, oscillator)
     for _ in range(ROUNDS):
         if not (velocity.is_exceeded_by(found) | residual.is_exceeded_by(found)):
-            break
+            return found
         found = replace(problem, bounds=(*bounds, *velocity.bounds, *residual.bounds)).motion()
-    return found
+    raise found.problem.refusal()
 
 
 def _cruising(problem: PeakProblem) -> PeakProblem:

@@ -28,7 +28,7 @@ from dataclasses import replace
 from functools import partial
 from math import inf
 
-from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedPlan
+from flat_planner_ros.core.arm import FloatArray, OutOfReach, PlanarArm, UncertifiedPlan
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     costate,
@@ -195,13 +195,19 @@ def stop_plan(
         return plan(request, running.problem.arm, running.options)
     effort = DEMAND * running.peak_effort
     velocity = DEMAND * running.peak_velocity
-    best = _stop(running, pose, jets, remaining)
+    options = running.options
+    try:
+        best = _stop(running, options, pose, jets, remaining)
+    except OutOfReach:
+        # To stop at all comes before bounds that were kept until now.
+        options = replace(options, peak=options.peak.unbounded)
+        best = _stop(running, options, pose, jets, remaining)
     shortest, longest = SHORTEST * remaining, remaining
     for _ in range(HALVINGS):
         middle = (shortest * longest) ** 0.5
         try:
-            tried = _stop(running, pose, jets, middle)
-        except UncertifiedPlan:
+            tried = _stop(running, options, pose, jets, middle)
+        except (UncertifiedPlan, OutOfReach):
             shortest = middle
             continue
         demanding = (tried.peak_effort > effort).any() or (tried.peak_velocity > velocity).any()
@@ -218,7 +224,9 @@ def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
     return use is not None and use.is_exceeded
 
 
-def _stop(running: Plan, pose: FloatArray, jets: FloatArray, duration: float) -> Plan:
+def _stop(
+    running: Plan, options: PlanningOptions, pose: FloatArray, jets: FloatArray, duration: float
+) -> Plan:
     """Return the plan to rest of a given duration that costs least."""
 
     def plan_to(values: FloatArray, options: PlanningOptions) -> Plan:
@@ -227,7 +235,7 @@ def _stop(running: Plan, pose: FloatArray, jets: FloatArray, duration: float) ->
         )
         return plan(request, arm, options)
 
-    arm, options = running.problem.arm, running.options
+    arm = running.problem.arm
     own = OWN_LAWS.get(options.strategy)
     # Costates are those of a quadratic cost.
     quadratic = with_quadratic_cost(options)

@@ -16,7 +16,7 @@
 
 from math import inf, pi
 
-from flat_planner_ros.core.arm import Drive, PlanarArm
+from flat_planner_ros.core.arm import Drive, OutOfReach, PlanarArm
 from flat_planner_ros.core.insensitive import UncertaintyBox
 from flat_planner_ros.core.peak import (
     peak_motion,
@@ -30,6 +30,7 @@ from flat_planner_ros.core.planning import (
     plan,
     PlanningOptions,
     residual_of_plan,
+    stop_plan,
     Strategy,
 )
 import numpy as np
@@ -196,6 +197,31 @@ def test_the_shortest_from_a_start_in_motion_keeps_its_bounds():
     assert found.peak_velocity <= 8.0
     assert found.inner_peak <= LIMIT
     assert peak_motion_from(ARM, free, PeakSettings(), start, 20.0).peak_velocity > 8.0
+
+
+def test_a_residual_that_no_motion_keeps_is_refused():
+    with pytest.raises(OutOfReach, match='max_residual = 1e-06'):
+        peak_motion(ARM, 0.4, PeakSettings(max_residual=1e-6), pi)
+
+
+@pytest.mark.parametrize(
+    'changes', [{'velocity': 6.0}, {'effort_rate': 0.3}, {'max_residual': 0.03}]
+)
+def test_a_stop_keeps_bounds_where_it_can_and_comes_in_any_case(changes):
+    options = PlanningOptions(strategy=Strategy.MIN_PEAK_EFFORT, peak=PeakSettings(**changes))
+    request = MotionRequest(start=np.zeros(2), final=np.array([pi, 0.0]), duration=1.4)
+    running = plan(request, ARM, options)
+    now = running.at(np.array([0.7]))
+    jets = now.planned[:, :6, 0]
+    for remaining in (0.7, 0.1):
+        found = stop_plan(running, now.positions[0], jets, remaining)
+        assert found.duration <= remaining
+        assert (found.sample(0.005).velocities[-1] == 0.0).all()
+        assert found.boundary_residual < 1e-9
+    if 'max_residual' in changes:
+        found = stop_plan(running, now.positions[0], jets, 0.7)
+        assert found.options.peak == options.peak
+        assert residual_of_plan(found).worst <= 0.03 * (1.0 + 1e-3)
 
 
 def test_settings_tell_whether_ways_are_alike():

@@ -22,6 +22,7 @@ from flat_planner_ros.core import EffortProfile, rollout
 import numpy as np
 import pytest
 from ros.rig import Planner
+from std_srvs.srv import Trigger
 
 PARAMETERS = {
     'strategy': 'min_peak_effort',
@@ -97,6 +98,18 @@ def test_takes_over_and_stops_in_motion(graph):
     assert verdict['strategy'] == 'min_peak_effort', verdict['message']
     assert verdict['level'] == DiagnosticStatus.OK
     assert float(verdict['peak_effort.joint1']) <= 0.015 * (1.0 + 1e-6)
+    assert graph.call(Trigger, '/flat_planner/stop').success
+
+
+def test_a_residual_is_kept_on_any_arm_and_costs_time(graph):
+    planner = Resting(graph, **{'peak.max_residual': 0.02})
+    verdict = planner.send()
+    assert verdict['level'] == DiagnosticStatus.OK, verdict['message']
+    assert float(verdict['predicted_residual_worst']) <= 0.02
+    assert BANG_BANG * 1.2 < float(verdict['duration']) < BANG_BANG * 1.26
+    assert float(verdict['duration_bound']) > 0.97 * float(verdict['duration'])
+    refused = planner.send(duration=0.2)
+    assert refused['state'] == 'REJECTED'
 
 
 @pytest.mark.parametrize(
