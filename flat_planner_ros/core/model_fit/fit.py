@@ -20,7 +20,7 @@ from math import inf, pi, sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
-from flat_planner_ros.core.model_fit.imbalance import find_imbalance
+from flat_planner_ros.core.model_fit.imbalance import find_imbalance, turning_of
 from flat_planner_ros.core.model_fit.judgement import covariance, doubt
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
@@ -158,7 +158,9 @@ def fit_model(
     found, free = _told(observed, found, scales, believed)
     imbalance = None
     if with_imbalance:
-        imbalance, found = find_imbalance(observed, found, free, scales)
+        former = observed
+        imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
+        other = (other[0] if observed is former else former, other[1])
     errors = _errors(observed, other, found, free, scales)
     result = _result(measurements, start, observed, found, free, errors, trust)
     return replace(result, imbalance=imbalance)
@@ -168,7 +170,7 @@ def _observed(measurements: Measurements, period: float) -> Observed:
     """Return the last two links in absolute angles."""
     times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
     span = max(SMOOTHING * period, 6 * measurements.period)
-    _, rates, _ = derivatives(times, angles, span)
+    _, rates, accelerations = derivatives(times, angles, span)
     base = rates[:, -3] if measurements.joints > 2 else np.zeros(times.size)
     segments = segments_of(times, measurements.period, SEGMENT * period)
     if not segments:
@@ -185,6 +187,7 @@ def _observed(measurements: Measurements, period: float) -> Observed:
         moves=np.column_stack([moves_of(*pair) for pair in zip(shown.T, steps, strict=True)]),
         rounding=steps / sqrt(12.0),
         segments=segments,
+        turning=turning_of(measurements.positions[:, -1], rates[:, -2:], accelerations[:, -2:]),
     )
 
 

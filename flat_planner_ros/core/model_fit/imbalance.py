@@ -32,7 +32,7 @@ EXPLAINED = 0.7
 """Sum of squares that an imbalance leaves at most, of that without; other faults do more [-]."""
 
 NEGLECTED = 1e-3
-"""Smallest imbalance that is said, relative to the inertia: the fit takes angles as small [-]."""
+"""Smallest imbalance that is said, relative to the inertia [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,40 +74,73 @@ class ImbalanceEstimate:
         return (
             f'imbalance of link n: {self.coupling:.4g} ± {self.std:.2g} kg m^2 ({share:.2g} % of '
             f'I*_n): make mass * arm of its counterbalance {change} by '
-            f'{abs(self.coupling):.4g} kg m^2 over the length of link n-1, and record again: '
-            f'deflections are taken as small, which may be a third off'
+            f'{abs(self.coupling):.4g} kg m^2 over the length of link n-1'
         )
 
 
+def turning_of(deflection: FloatArray, rates: FloatArray, accelerations: FloatArray) -> FloatArray:
+    """
+    Return what a unit of coupling takes from links n-1 and n besides the mass matrix's part.
+
+    Parameters
+    ----------
+    deflection
+        Of the passive joint, shape (m,) [rad].
+    rates, accelerations
+        Of both links in absolute angles, shape (m, 2) [rad/s], [rad/s^2].
+
+    Returns
+    -------
+    FloatArray
+        Shape (m, 2) [rad/s^2], of (4) of docs/derivation.md.
+
+    """
+    less, sine = np.cos(deflection) - 1.0, np.sin(deflection)
+    on_inner = less * accelerations[:, 1] - sine * rates[:, 1] ** 2
+    on_last = less * accelerations[:, 0] + sine * rates[:, 0] ** 2
+    return np.column_stack((on_inner, on_last))
+
+
 def find_imbalance(
-    observed: Observed, found: Refined, free: list[int], scales: FloatArray
-) -> tuple[ImbalanceEstimate | None, Refined]:
+    observed: Observed, other: Observed, found: Refined, free: list[int], scales: FloatArray
+) -> tuple[ImbalanceEstimate | None, Refined, Observed]:
     """
     Return the imbalance that a recording shows, and the fit with it where there is one.
 
     Parameters
     ----------
-    observed, found, free, scales
-        The recording, the fit of a balanced arm, what it tells, and the parameters' scales.
+    observed, other
+        The recording with one interpolation of the effort, and with the other.
+    found, free, scales
+        The fit of a balanced arm, what it tells, and the parameters' scales.
 
     Returns
     -------
-    tuple[ImbalanceEstimate | None, Refined]
-        None, and the fit as it was, where inertias or stiffness are not told.
+    tuple[ImbalanceEstimate | None, Refined, Observed]
+        None where inertias or stiffness are not told; the fit, and the interpolation that goes
+        with it, as they were unless there is an imbalance.
 
     Notes
     -----
-    To first order in the deflection the coupling is a constant of the last two rows, (N7) of
-    docs/derivation.md: the mass matrix of both links is not diagonal.
+    To first order in the deflection the mass matrix of both links is not diagonal, and constant;
+    what there is besides follows from the measured motion (`turning_of`).
 
     """
     if not {BOTH, LAST, STIFFNESS} <= set(free):
-        return None, found
-    last = float(found.parameters[LAST])
-    widened = np.append(scales, SCALE * last)
+        return None, found, observed
+    widened = np.append(scales, SCALE * float(found.parameters[LAST]))
     with_it = [*free, IMBALANCE]
     start = np.append(found.parameters, 0.0)
-    tried = refine(observed, start, with_it, widened, found.spread, found.starts)
+
+    def tried_with(each: Observed) -> Refined:
+        return refine(each, start, with_it, widened, found.spread, found.starts)
+
+    best, tried = observed, tried_with(observed)
+    if tried.around.cost < EXPLAINED * found.around.cost:
+        # A balanced arm may have been explained by the wrong interpolation.
+        again = tried_with(other)
+        if again.around.cost < tried.around.cost:
+            best, tried = other, again
     error = np.sqrt(covariance(tried.around, widened[with_it])[-1, -1]) * widened[-1]
     estimate = ImbalanceEstimate(
         coupling=float(tried.parameters[IMBALANCE]),
@@ -116,6 +149,6 @@ def find_imbalance(
         left=tried.around.cost / found.around.cost,
     )
     if not estimate.is_seen:
-        return estimate, found
-    fixed = refine(observed, tried.parameters, free, widened, tried.spread, tried.starts)
-    return estimate, fixed
+        return estimate, found, observed
+    fixed = refine(best, tried.parameters, free, widened, tried.spread, tried.starts)
+    return estimate, fixed, best

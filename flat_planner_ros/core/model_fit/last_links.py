@@ -78,6 +78,9 @@ class Forcing(NamedTuple):
         Which of them each model takes, shape (models,).
     base
         Angular velocity of the link before n-1, shape (2 K + 1, segments) [rad/s].
+    turning
+        What a coupling of both links takes from link n-1 and from link n for each unit, besides
+        its part in the mass matrix, shape (2 K + 1, 2, segments) [rad/s^2]; None for nothing.
 
     """
 
@@ -85,6 +88,7 @@ class Forcing(NamedTuple):
     effort: FloatArray
     variant: npt.NDArray[np.intp]
     base: FloatArray
+    turning: FloatArray | None = None
 
 
 class _Flow(NamedTuple):
@@ -132,8 +136,14 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
     # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
     drag = models[:, VISCOUS, None] * forcing.base[:, None, :]
     forces = forcing.effort[:, forcing.variant] + drag
-    triples = np.stack((forces[:-2:2], forces[1:-1:2], forces[2::2]), axis=-2)
-    pushed = whole.forced @ triples
+    pushed: FloatArray | float = 0.0
+    if forcing.turning is not None:
+        taken = models[:, IMBALANCE, None] * forcing.turning[:, :, None]
+        forces = forces - taken[:, 0]
+        last = _linear_flow(models, forcing.step, on_last=True)
+        pushed = last.forced @ _triples(-taken[:, 1])
+    triples = _triples(forces)
+    pushed = pushed + whole.forced @ triples
     if models[:, COULOMB].any():
         half = _linear_flow(models, forcing.step / 2)
         _add_with_friction(states, pushed, triples, models, forcing.base, whole, half)
@@ -143,8 +153,13 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
     return states
 
 
-def _linear_flow(models: FloatArray, step: float) -> _Flow:
-    """Return how states and forces act on the state a step later."""
+def _triples(forces: FloatArray) -> FloatArray:
+    """Return the forces at start, middle and end of every step, shape (K, models, 3, segments)."""
+    return np.stack((forces[:-2:2], forces[1:-1:2], forces[2::2]), axis=-2)
+
+
+def _linear_flow(models: FloatArray, step: float, *, on_last: bool = False) -> _Flow:
+    """Return how states, and forces on link n-1 or on the last one, act a step later."""
     link, last = models[:, BOTH] - models[:, LAST], models[:, LAST]
     coupling = models[:, IMBALANCE] if models.shape[1] > IMBALANCE else np.zeros(len(models))
     # Of the inverse of the mass matrix: what a force on link n-1 and one between both links do.
@@ -163,6 +178,9 @@ def _linear_flow(models: FloatArray, step: float) -> _Flow:
     augmented[:, 3, 2] = models[:, VISCOUS] * between
     augmented[:, 3, 3] = -models[:, DAMPING] * relative
     augmented[:, 3, 4] = -between
+    if on_last:
+        augmented[:, 2, 4] = by_force - between
+        augmented[:, 3, 4] = relative - between
     augmented[:, 4, 5] = augmented[:, 5, 6] = 1.0
     flow = _exponential(step * augmented)[:, :STATES]
     value, slope, bend = (flow[:, :, j] for j in (4, 5, 6))

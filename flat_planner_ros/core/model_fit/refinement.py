@@ -30,6 +30,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     COULOMB,
     DELAY,
     Forcing,
+    IMBALANCE,
     LAST,
     OFFSET,
     STATES,
@@ -99,6 +100,9 @@ class Observed:
         Whether efforts go straight from sample to sample, instead of on cubics.
     refinement
         By which the steps of the integration are divided [-].
+    turning
+        What a coupling of both links takes from either for each unit, as measured, shape (m, 2)
+        [rad/s^2]; None where none is looked for.
 
     """
 
@@ -112,6 +116,7 @@ class Observed:
     segments: Sequence[Segment]
     is_linear: bool = False
     refinement: float = 1.0
+    turning: FloatArray | None = None
 
 
 class Linearisation(NamedTuple):
@@ -371,4 +376,8 @@ def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: flo
     else:
         effort = between(observed.times, observed.effort, shifted)
     base = between(observed.times, observed.base, grid) if observed.base.any() else 0.0 * grid
-    return Forcing(step, effort, variant, base)
+    turning = None
+    if observed.turning is not None and models.shape[1] > IMBALANCE:
+        each = [between(observed.times, column, grid) for column in observed.turning.T]
+        turning = np.stack(each, axis=1)
+    return Forcing(step, effort, variant, base, turning)
