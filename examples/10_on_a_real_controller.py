@@ -28,6 +28,7 @@ import sys
 from flat_planner_ros.core import Goal, GoalPoint, PlannerSession, StartSource
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.parameters.planner import build, ROWS
+from flat_planner_ros.ros.wire.command_form import CommandForm
 from flat_planner_ros.ros.wire.conversions import command_bytes
 from matplotlib import pyplot as plt
 from rclpy.serialization import deserialize_message
@@ -46,7 +47,7 @@ track = session.track(now=1.0)
 
 # A stamp of zero plays on arrival; the planner node stamps with the time of its clock.
 command = deserialize_message(
-    command_bytes(track, settings.joints, absolute_stamp=False), JointTrajectory
+    command_bytes(track, settings.joints, CommandForm(absolute_stamp=False)), JointTrajectory
 )
 fields = ('positions', 'velocities', 'accelerations', 'effort')
 points = []
