@@ -20,6 +20,9 @@ from math import pi
 from flat_planner_ros.core.arm.arrays import FloatArray
 from flat_planner_ros.core.arm.samples import JointSample, JUMP, SampleTable, travel
 import numpy as np
+from numpy.typing import NDArray
+
+BoolArray = NDArray[np.bool_]
 
 RIM = 0.05
 """Angle by which noise may carry a wrapped angle beyond its range [rad]."""
@@ -53,7 +56,7 @@ class TurnCounter:
         self._last: list[float] = []
         self._turns: FloatArray | None = None
         self._place: FloatArray | None = None
-        self._is_whole: np.ndarray | None = None
+        self._is_whole: BoolArray | None = None
 
     def unwrapped(self, sample: JointSample) -> JointSample:
         """Return the next sample with its turns, the very same one where there are none."""
@@ -96,6 +99,8 @@ class TurnCounter:
         wanted = np.round((place - raw) / TURN)
         is_there = np.abs(place - raw - TURN * wanted) <= SAME_PLACE
         is_there &= (raw >= -pi - RIM) & (raw <= TURN + RIM)
+        # Below zero, and shown as nearly 2 pi: that is the other range.
+        self._know(is_there & (wanted < 0.0) & (raw > pi + RIM))
         aligned = np.where(is_there, wanted, turns)
         if (aligned != turns).any():
             self._turns = aligned
@@ -129,16 +134,20 @@ class TurnCounter:
         is_half = is_step & (lowest >= -pi - RIM) & (highest <= pi + RIM)
         is_whole = is_step & (lowest >= -RIM) & (highest <= TURN + RIM)
         if is_whole.any():
-            shown = is_whole & ((change > 0.0) | self._moves_up(former, sample))
-            self._is_whole = shown if self._is_whole is None else self._is_whole | shown
-            is_half |= is_whole & self._is_whole
+            known = self._know(is_whole & ((change > 0.0) | self._moves_up(former, sample)))
+            is_half |= is_whole & known
         if is_half.any():
             self._turns = self.turns - np.sign(change) * is_half
         # Where an angle is unknown, what it was before is still to be compared with.
-        known = np.where(np.isnan(raw), last, raw)
-        self._remember(former, replace(sample, positions=known))
+        angles = np.where(np.isnan(raw), last, raw)
+        self._remember(former, replace(sample, positions=angles))
 
-    def _moves_up(self, former: JointSample, sample: JointSample) -> np.ndarray:
+    def _know(self, is_whole: BoolArray) -> BoolArray:
+        """Keep in mind which joints are wrapped to 0 ... 2 pi; return all that are known."""
+        self._is_whole = is_whole if self._is_whole is None else self._is_whole | is_whole
+        return self._is_whole
+
+    def _moves_up(self, former: JointSample, sample: JointSample) -> BoolArray:
         """Tell which joints move to larger angles before and, as far as is known, after a step."""
         earlier = self._earlier
         if former.velocities is not None and sample.velocities is not None:

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import nan
 import sys
 from time import perf_counter
 from typing import Any
@@ -44,6 +45,7 @@ from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stam
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.message_types import UnknownType
 from flat_planner_ros.ros.wire.verdict_text import log_line, values_of
+import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
@@ -58,6 +60,8 @@ class PlannerNode(GuardedNode):
         self._configuration = NodeParameters(self, ROWS, build, self._apply)
         self._session = PlannerSession(self._settings.session)
         self._reader = JointStateReader(self._joints, self._settings.joint_states)
+        # Its spring tells in which turn the passive joint is.
+        self._reader.align(np.array([*[nan] * (len(self._joints) - 1), 0.0]))
         self._goals = GoalQueue(self, self._session, self._answer)
         self._session.source = self.resolve_topic_name(interfaces.JOINT_STATES)
         self._sent_start: float | None = None

@@ -132,5 +132,14 @@ def test_a_pose_tells_the_turns_of_before(is_heard_before):
 def test_a_pose_tells_the_turn_of_an_encoder_from_zero_to_two_pi():
     counter = TurnCounter()
     counter.align(np.array([-0.1]))
-    (found,) = unwrapped(counter, sample(0.0, [2 * pi - 0.1]))
-    assert found == pytest.approx([-0.1])
+    found = unwrapped(counter, *(sample(0.005 * k, [q]) for k, q in enumerate(whole([-0.1, 0.1]))))
+    assert found[:, 0] == pytest.approx([-0.1, 0.1])
+    assert counter.range_of(0) == '0 to 2 pi'
+
+
+def test_a_pose_may_be_known_of_some_joints_only():
+    counter = TurnCounter()
+    counter.align(np.array([nan, 0.0]))
+    shown = [[6.2, 6.28], [6.2, 0.001]]
+    found = unwrapped(counter, *(sample(0.005 * k, q, [0.0, 0.0]) for k, q in enumerate(shown)))
+    assert found == pytest.approx(np.array([[6.2, 6.28 - 2 * pi], [6.2, 0.001]]))
