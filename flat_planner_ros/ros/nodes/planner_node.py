@@ -168,11 +168,12 @@ class PlannerNode(GuardedNode):
 
     def _on_measured(self, msg: JointState) -> None:
         """Keep the measured state for the next start."""
+        now = self._now()
         # A simulated clock is everybody's, and is heard in steps, perhaps after what it stamps.
         if stamps.is_stamped(msg) and not stamps.is_simulated(self.get_clock()):
-            self._offset.hear(stamps.seconds(msg.header.stamp), self._now())
+            self._offset.hear(stamps.seconds(msg.header.stamp), now)
         for sample in self._input.samples(self._reader, msg):
-            self._session.measure(sample, self._now())
+            self._session.measure(sample, now)
         if self._reader.is_in_parts:
             self._session.lack = self._reader.lack
         self._goals.answer_due()
