@@ -18,8 +18,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from flat_planner_ros.core.arm import InvalidRequest
-from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.ros.parameters import planner, plant
+from flat_planner_ros.ros.parameters.idle import READERS
 from flat_planner_ros.ros.parameters.row import InvalidParameter, Row
 from flat_planner_ros.ros.wire import interfaces
 from rclpy.parameter import Parameter
@@ -62,21 +62,12 @@ SHOWN = {
 }
 """Parameters of these nodes that it reads only: they are chosen with the arm."""
 
-_OF_EFFORT = {'strategy': [Strategy.MIN_CONTROL_EFFORT.value, Strategy.MIXED.value]}
-_OF_ENERGY = {'strategy': [Strategy.MIN_POTENTIAL_ENERGY.value, Strategy.MIXED.value]}
-_OF_INSENSITIVE = {'strategy': [Strategy.INSENSITIVE.value]}
-
 WHEN: dict[str, dict[str, list[Any]]] = {
-    'weights.effort': _OF_EFFORT,
-    'weights.energy': _OF_ENERGY,
-    'weights.r': _OF_EFFORT,
-    'weights.p': _OF_ENERGY,
-    'insensitivity.nominal': _OF_INSENSITIVE,
-    'insensitivity.criterion': _OF_INSENSITIVE,
-    'insensitivity.weight': _OF_INSENSITIVE,
-    'insensitivity.max_effort_rms': _OF_INSENSITIVE,
-    'insensitivity.max_residual': _OF_INSENSITIVE,
-    'peak.insensitive': {'strategy': [Strategy.MIN_PEAK_EFFORT.value]},
+    **{
+        name: {'strategy': [strategy.value for strategy in READERS[name]]}
+        for name in SETTINGS[interfaces.PLANNER]
+        if name in READERS
+    },
     # The reduced form of the model does not know the masses that could be out of balance.
     'mismatch.imbalance': {'model.inertia_star': [None]},
 }
