@@ -126,12 +126,14 @@ def shortest_peak_duration_from(
     if settings.is_homogeneous:
         return duration
     oscillator = Oscillator.of(arm, drive)
+    # Little is gained on the way at full speed by a start in motion.
+    first = max(duration, abs(float(problem.state.sigma)) / settings.velocity)
     return _shortest_within(
         lambda tried: motion_within(problem.lasting(tried), oscillator),
-        duration,
+        first,
         (1.0 - BOUND_MARGIN) * peak,
         QUARTER_TURN / problem.mode.frequency,
-        is_least=True,
+        is_least=first == duration,
     )
 
 

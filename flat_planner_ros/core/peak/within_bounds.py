@@ -37,7 +37,7 @@ import numpy as np
 ROUNDS = 20
 """Programmes after which bounds are given up."""
 
-FIRST_MARGIN = 2e-3
+FIRST_MARGIN = 4e-3
 """Share of the velocity that is kept in reserve between the places of its bound, at first [-]."""
 
 CRUISE_TURNS = 2.0
@@ -51,6 +51,12 @@ ZONE_INTERVALS = 40
 
 NEAR = 0.4
 """Share of the velocity from which a place is bounded, too [-]."""
+
+BEYOND = 2e-3
+"""Excess over a tightened bound from which a place is bounded that was not [-]."""
+
+TIGHTENED = 1e-3
+"""Share by which a bound is tightened beyond what a motion exceeds it: programmes are few [-]."""
 
 VELOCITY_MARGIN = 1e-5
 """The same where it is looked at [-]."""
@@ -140,11 +146,11 @@ class _Velocity:
             return True
         (last,) = self.bounds
         speeds = np.abs(velocities)
-        beyond = speeds > (1.0 - last.margin) * self._limit * (1.0 + FIRST_MARGIN)
+        beyond = speeds > (1.0 - last.margin) * self._limit * (1.0 + BEYOND)
         # While the drive rests the velocity stays what it is.
         beyond &= ~found.problem.is_idle
         signs = np.where(last.signs == 0.0, np.where(beyond, np.sign(velocities), 0.0), last.signs)
-        margin = 1.0 - (1.0 - 2.0 * VELOCITY_MARGIN) * (1.0 - last.margin) * self._limit / reached
+        margin = 1.0 - (1.0 - TIGHTENED) * (1.0 - last.margin) * self._limit / reached
         if (signs != last.signs).any():
             margin = last.margin
         self.bounds = (VelocityBound(limit=self._limit, signs=signs, margin=margin),)
