@@ -49,7 +49,7 @@ demo: install  ## the paper's experiment on the three nodes: table, figures and 
 test: export REQUIRE_ROS := 1
 test: export ROS_PYTHON_CHECK_FIELDS := 1
 test: lint  ## ruff, mypy and all tests
-	$(BIN)/python -c '$(PYTEST)' -n 4 --dist loadfile --timeout=300 $(ARGS)
+	$(BIN)/python -c '$(PYTEST)' -n 3 --dist loadfile --timeout=300 $(ARGS)
 
 fuzz: export ALL_CASES := 1
 fuzz: export FUZZ_CASES ?= 100000
