@@ -70,7 +70,7 @@ class Controller:
             graph.probe,
             action,
             CONTROLLER,
-            execute_callback=self._end,
+            execute_callback=lambda _: action.Result(),
             goal_callback=lambda _: GoalResponse.ACCEPT if self.accepts else GoalResponse.REJECT,
             handle_accepted_callback=self.handles.append,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
@@ -79,13 +79,12 @@ class Controller:
 
     def end(self, verb, code=0, words='', index=-1):
         """End a goal by one of the verbs of rclpy."""
-        self.said = verb, code, words
-        self.handles[index].execute()
 
-    def _end(self, handle):
-        verb, code, words = self.said
-        getattr(handle, verb)()
-        return self.action.Result(error_code=code, error_string=words)
+        def ended(handle):
+            getattr(handle, verb)()
+            return self.action.Result(error_code=code, error_string=words)
+
+        self.handles[index].execute(ended)
 
 
 class Commanded(Timed):
@@ -236,12 +235,16 @@ class Served(Timed):
 
 def test_a_goal_is_planned_followed_and_succeeds(world, action):
     rig = Served(world, action)
-    rig.follow(goal(1.0, 2.0))
+    rig.follow(goal(1.0, 60.0))
     rig.accepted()
-    rig.be(11.0)
-    world.expect(lambda: any(0.0 < m.desired.positions[0] < 1.0 for m in rig.heard), 'feedback')
+
+    def has_heard():
+        rig.be(rig.now() + 0.06)
+        return any(0.0 < feedback.desired.positions[0] < 1.0 for feedback in rig.heard)
+
+    world.expect(has_heard, 'feedback')
     assert rig.heard[-1].joint_names == ['joint1', 'joint2']
-    rig.be(12.2)
+    rig.be(71.0)
     status, code, words = rig.result()
     assert (status, code) == (SUCCEEDED, 0)
     assert 'has come to its end' in words
