@@ -83,19 +83,26 @@ def _kept(
     return motion_within(problem, Oscillator.of(arm, drive))
 
 
-def check_peak(arm: PlanarArm, drive: Drive = Drive.EFFORT) -> None:
+def check_peak(arm: PlanarArm, settings: PeakSettings, drive: Drive = Drive.EFFORT) -> None:
     """
     Refuse an arm for which no motion of least peak can be planned.
+
+    Parameters
+    ----------
+    arm, settings, drive
+        As for `peak_motion`.
 
     Raises
     ------
     InvalidRequest
-        The passive joint does not oscillate.
+        The passive joint does not oscillate, or not on all arms whose residual is bounded.
     NotFlat
         The arm is not flat.
 
     """
     DrivenMode.of(arm, drive)
+    if settings.max_residual > 0.0:
+        Oscillator.of(arm, drive).edges(settings.box, duration=1.0)
 
 
 def peak_motion_from(

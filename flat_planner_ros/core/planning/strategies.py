@@ -233,7 +233,7 @@ def _of_peak(found: PeakMotion, cost: float) -> OwnMotion:
 def _check_least_peak(arm: PlanarArm, options: PlanningOptions) -> None:
     """Refuse another flat map, and arms that do not oscillate."""
     _check_flat_model(options)
-    check_peak(arm, options.drive)
+    check_peak(arm, options.peak, options.drive)
 
 
 def _shortest_least_peak(

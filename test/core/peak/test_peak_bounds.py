@@ -16,9 +16,10 @@
 
 from math import inf, pi
 
-from flat_planner_ros.core.arm import Drive, OutOfReach, PlanarArm
+from flat_planner_ros.core.arm import Drive, InvalidRequest, OutOfReach, PlanarArm
 from flat_planner_ros.core.insensitive import UncertaintyBox
 from flat_planner_ros.core.peak import (
+    check_peak,
     peak_motion,
     peak_motion_from,
     PeakSettings,
@@ -197,6 +198,14 @@ def test_the_shortest_from_a_start_in_motion_keeps_its_bounds():
     assert found.peak_velocity <= 8.0
     assert found.inner_peak <= LIMIT
     assert peak_motion_from(ARM, free, PeakSettings(), start, 20.0).peak_velocity > 8.0
+
+
+def test_a_box_with_arms_that_do_not_oscillate_is_refused():
+    damped = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=3e-4)
+    wide = UncertaintyBox(stiffness=0.8, damping=0.9)
+    check_peak(damped, PeakSettings(box=wide))
+    with pytest.raises(InvalidRequest, match='does not oscillate'):
+        check_peak(damped, PeakSettings(box=wide, max_residual=0.01))
 
 
 def test_a_residual_that_no_motion_keeps_is_refused():
