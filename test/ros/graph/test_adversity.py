@@ -59,7 +59,7 @@ def test_a_burst_of_200_goals_gets_200_verdicts_in_order(graph):
 
 
 def test_parameters_changed_in_a_motion_are_for_the_next_one(graph):
-    world = World(graph)
+    world = World(graph, arguments=['-p', 'flat_planner:weights.r:=5.0'])
     changes = {
         'strategy': 'polynomial',
         'weights.r': 10.0,
