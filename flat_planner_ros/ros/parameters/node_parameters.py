@@ -119,6 +119,9 @@ class NodeParameters(Generic[Settings]):
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
         """Answer a request to change parameters."""
         changes = {p.name: p.value for p in parameters if p.name in self._rows}
+        for name, value in changes.items():
+            if value is None:  # else rclpy would take one away that has no type of its own
+                return SetParametersResult(successful=False, reason=f'{name} needs a value')
         try:
             self._checked(changes)
         except FlatPlannerError as error:

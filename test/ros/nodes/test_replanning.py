@@ -116,7 +116,7 @@ def test_efforts_are_streamed_while_the_arm_moves_and_end_with_zeros(graph):
         first = arm.send(pi if here < 1.0 else 0.0)
         arm.wait_until(float(first['start_time']) + 1.2)
         efforts = np.array([list(message.data) for message in stream])
-        if np.count_nonzero(efforts) <= 100:  # periods may be merged on a busy machine
+        if np.count_nonzero(efforts) < 190:  # periods may be merged on a busy machine
             raise Late(f'{np.count_nonzero(efforts)} efforts of 200')
         return first, efforts
 
