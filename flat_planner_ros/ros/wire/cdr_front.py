@@ -47,6 +47,8 @@ class Front:
     ----------
     at
         Offset of the next entry from the end of the encapsulation.
+    padding
+        Bytes that were passed for alignment: they mean nothing, and may be anything.
 
     """
 
@@ -55,6 +57,7 @@ class Front:
         self._length = Struct(f'{order}I')
         self._stamp = f'{order}iI'
         self.at = 0
+        self.padding: list[slice] = []
 
     def stamp(self) -> float:
         """Return the stamp of the header [s]."""
@@ -64,7 +67,7 @@ class Front:
 
     def length(self, size: int) -> int:
         """Return the length of a sequence whose entries take at least some bytes each."""
-        self.at += -self.at % LENGTH
+        self._align(LENGTH)
         (entry,) = self._length.unpack_from(self._data, self.taken(LENGTH))
         length = int(entry)
         if length * size > len(self._data):
@@ -89,9 +92,17 @@ class Front:
         for _ in range(arrays):
             width = self.length(DOUBLE)
             if width:
-                self.at += -self.at % DOUBLE
+                self._align(DOUBLE)
             places.append((self.taken(DOUBLE * width), width))
         return places
+
+    def _align(self, size: int) -> None:
+        """Go on to the next multiple of a size."""
+        gap = -self.at % size
+        if gap:
+            begin = HEADER + self.at
+            self.padding.append(slice(begin, begin + gap))
+        self.at += gap
 
     def taken(self, size: int) -> int:
         """Return where the next bytes begin in the message and go past them."""

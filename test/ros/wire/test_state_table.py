@@ -58,6 +58,18 @@ def test_a_table_has_what_the_middleware_reads(names, velocities, efforts, frame
                 np.testing.assert_array_equal(found, expected)
 
 
+def test_padding_may_be_anything():
+    data = [bytearray(serialize_message(msg)) for msg in messages(frame='a')]
+    expected = read_states([bytes(message) for message in data])
+    for number, message in enumerate(data):
+        # After the encapsulation, the stamp, the length of a string and "a" with its zero.
+        message[4 + 8 + 4 + 2 : 4 + 8 + 4 + 4] = bytes([number, 255 - number])
+    found = read_states([bytes(message) for message in data])
+    assert found.names == expected.names
+    np.testing.assert_array_equal(found.samples.positions, expected.samples.positions)
+    np.testing.assert_array_equal(found.samples.times, expected.samples.times)
+
+
 def test_what_is_not_alike_is_left_to_the_middleware():
     alike = [serialize_message(msg) for msg in messages()]
     assert read_states(alike) is not None
