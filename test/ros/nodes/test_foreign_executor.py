@@ -19,7 +19,7 @@ import sys
 
 from flat_planner_ros.ros.wire import interfaces
 import pytest
-from ros.rig import ANSWERS, goal, GOAL, not_verified, Rig, values
+from ros.rig import ANSWERS, GOAL, goal, not_verified, Rig, values
 
 GOALS = 20
 
