@@ -19,7 +19,7 @@ from ros.rig import Planner
 from ros.timed_planner import LENIENT, Timed
 
 
-def test_a_clock_set_back_in_a_motion_fails_it_and_the_next_goal_starts_anew(graph):
+def test_a_clock_set_back_in_a_motion_fails_it_and_the_next_goal_starts_anew(graph, capfd):
     rig = Timed(graph)
     rig.be(107.0)
     rig.measure()
@@ -31,9 +31,7 @@ def test_a_clock_set_back_in_a_motion_fails_it_and_the_next_goal_starts_anew(gra
     assert failed['error_name'] == 'CLOCK_JUMPED'
     assert failed['error_code'] == '-124'
     assert float(failed['value']) == pytest.approx(-107.0)
-    line = 'the clock was set back by 107.000 s'
-    graph.expect(lambda: graph.logged(line), 'the line')
-    assert len(graph.logged(line)) == 1
+    assert capfd.readouterr().err.count('the clock was set back by 107.000 s') == 1
     rig.measure((0.3, 0.0))
     verdict = rig.send(1.0, 2.0)
     assert verdict['state'] == 'ACCEPTED'

@@ -125,7 +125,8 @@ def test_efforts_are_streamed_while_the_arm_moves_and_end_with_zeros(graph):
     moving = np.flatnonzero(efforts[:, 0])
     assert 100 < len(moving) <= 202
     assert np.abs(efforts).max() == pytest.approx(float(first['peak_effort.joint1']), rel=0.02)
-    assert len(efforts) - 1 - moving[-1] == 10
+    # Ten, and one where the last of the motion comes just when it ends.
+    assert len(efforts) - 1 - moving[-1] in (10, 11)
     assert not efforts[-1].any()
 
 

@@ -22,7 +22,7 @@ from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 import numpy as np
 import pytest
 from ros.conftest import TIMEOUT
-from ros.rig import Rig, stamp, START_DELAY
+from ros.rig import COMMAND, Rig, stamp, START_DELAY
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
@@ -61,10 +61,15 @@ class Tracked(Rig):
         graph.expect(lambda: self.states, 'a joint state')
 
     def start_tracker(self, **given):
-        """Start a tracker, with other parameters if `given`, and wait until it is made."""
-        ready = len(self.graph.logged('certified'))
+        """Start a tracker, with other parameters if `given`, and wait until it hears commands."""
+        known = self._trackers()
         self.tracker = self.graph.start('tracker_node', *arguments({**TRACKER, **given}))
-        self.graph.expect(lambda: len(self.graph.logged('certified')) > ready, 'a tracker')
+        self.graph.expect(lambda: self._trackers() - known, 'a tracker')
+
+    def _trackers(self):
+        """Return the ends of the trackers that commands are sent to."""
+        readers = self.graph.probe.get_subscriptions_info_by_topic(COMMAND)
+        return {bytes(r.endpoint_gid) for r in readers if r.node_name == 'flat_tracker'}
 
     def pass_time(self, duration):
         """Let simulated time [s] pass."""
