@@ -23,9 +23,9 @@ from flat_planner_ros.core import (
     Plan,
     plan,
     PlanningOptions,
-    SimulatedArm,
     Strategy,
 )
+from flat_planner_ros.core.plant import SimulatedArm
 from measurement import Section
 import numpy as np
 from problem import arm, request
