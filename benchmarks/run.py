@@ -42,18 +42,8 @@ BENCHMARKS = (
 )
 """Modules with a function `sections`, in this order."""
 
-WITHOUT_ROS = (
-    'planning',
-    'scaling',
-    'stream',
-    'via_points',
-    'duration',
-    'insensitive',
-    'peak',
-    'model_fit',
-    'tracking',
-)
-"""Those that need no ROS."""
+WITH_ROS = ('node_path', 'plant', 'monitor', 'start_up')
+"""Those that need ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'
 """What a whole run writes."""
@@ -85,7 +75,7 @@ def main() -> int:
     os.environ['ROS_DOMAIN_ID'] = str(options.domain)
     text = [*_machine()]
     for name in options.only or BENCHMARKS:
-        if name not in WITHOUT_ROS and find_spec('rclpy') is None:
+        if name in WITH_ROS and find_spec('rclpy') is None:
             text.append(f'## {name}\n\nnot run: rclpy is not installed')
             continue
         for section in import_module(name).sections(options):

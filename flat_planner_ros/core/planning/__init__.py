@@ -36,7 +36,7 @@ from flat_planner_ros.core.planning.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
-from flat_planner_ros.core.planning.strategies import check_options, shortest_known
+from flat_planner_ros.core.planning.strategies import check_options, OWN_LAWS, shortest_known
 from flat_planner_ros.core.planning.tradeoff import (
     baselines,
     duration_advice,
@@ -71,6 +71,7 @@ __all__ = [
     'MotionRequest',
     'NoFeasibleDuration',
     'OnViolation',
+    'OWN_LAWS',
     'Plan',
     'plan',
     'planned_at_rest',

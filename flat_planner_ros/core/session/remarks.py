@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from math import pi
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.planning import Plan, PlanSamples, Strategy
+from flat_planner_ros.core.planning import OWN_LAWS, Plan, PlanSamples
 from flat_planner_ros.core.session.goal import Goal
 from flat_planner_ros.core.session.motion_start import MotionStart
 from flat_planner_ros.core.session.settings import SessionSettings
@@ -85,8 +85,8 @@ def layer_remarks(settings: SessionSettings, found: Plan, samples: PlanSamples) 
         A plan, and what is sent of it.
 
     """
-    # Both are steep by purpose, not by a weight.
-    if found.options.strategy in (Strategy.INSENSITIVE, Strategy.MIN_PEAK_EFFORT):
+    # They are steep by purpose, not by a weight.
+    if found.options.strategy in OWN_LAWS:
         return
     efforts = samples.efforts[:, -2]  # joint n-1 alone carries the weights' layers
     step = float(np.abs(np.diff(efforts)).max(initial=0.0))
