@@ -16,12 +16,24 @@
 
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
 from flat_planner_ros.core.model_fit.fit import fit_model, Trust
+from flat_planner_ros.core.model_fit.information import (
+    foresee,
+    ForeseenMotion,
+    information,
+    misprediction,
+)
+from flat_planner_ros.core.model_fit.last_links import NAMES
 from flat_planner_ros.core.model_fit.measurements import Measurements
 
 __all__ = [
     'fit_model',
+    'foresee',
+    'ForeseenMotion',
+    'information',
     'Measurements',
+    'misprediction',
     'ModelFit',
+    'NAMES',
     'ParameterEstimate',
     'Trust',
 ]

@@ -46,6 +46,7 @@ from flat_planner_ros.core.model_fit.refinement import (
     refine,
     Refined,
 )
+from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
 from flat_planner_ros.core.model_fit.signals import derivatives, segments_of
 from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
 import numpy as np
@@ -58,15 +59,6 @@ SMOOTHING = 0.15
 
 TOLD = 0.3
 """Largest standard error of a parameter that counts as told, relative to its scale [-]."""
-
-LIGHT_DAMPING = 0.01
-"""Damping ratio that sets the scale of a damping which is smaller [-]."""
-
-FRICTION_SHARE = 0.1
-"""Scale of friction, relative to the effort [-]."""
-
-OFFSET_SCALE, DELAY_SCALE = 0.05, 0.01
-"""Scales of an encoder's offset [rad] and of a delay [s]."""
 
 LITTLE = 2.0
 """Residual relative to the noise with which no other guess is tried [-]."""
@@ -150,8 +142,8 @@ def fit_model(
     if measurements.joints != start.n:
         raise InvalidRequest(f'{measurements.joints} joints measured, the arm has {start.n}')
     period = 2 * pi / start.natural_mode().frequency
-    observed = _observed(measurements, period)
-    believed = _vector(start)
+    observed = observed_of(measurements, period)
+    believed = vector_of(start)
     noise = np.maximum(_noise(measurements), 1e-9)
     found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
     found, observed, other = _interpolated(observed, found, scales)
@@ -166,7 +158,7 @@ def fit_model(
     return replace(result, imbalance=imbalance)
 
 
-def _observed(measurements: Measurements, period: float) -> Observed:
+def observed_of(measurements: Measurements, period: float) -> Observed:
     """Return the last two links in absolute angles."""
     times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
     span = max(SMOOTHING * period, 6 * measurements.period)
@@ -197,12 +189,6 @@ def _noise(measurements: Measurements) -> FloatArray:
     return np.array([np.linalg.norm(each[:-1]), each[-1]])
 
 
-def _vector(arm: PlanarArm) -> FloatArray:
-    """Return the parameters of an arm in the order of NAMES."""
-    friction = arm.viscous_friction[-1], arm.coulomb_friction[-1]
-    return np.array([*arm.inertia_star, arm.stiffness, arm.damping, *friction, 0.0, 0.0])
-
-
 def _guesses(
     measurements: Measurements, observed: Observed, period: float, believed: FloatArray
 ) -> list[FloatArray]:
@@ -227,7 +213,7 @@ def _first(
     best, best_scales = None, np.empty(0)
     coarse = replace(observed, refinement=COARSE)
     for guess in guesses:
-        scales = _scales(observed, guess)
+        scales = scales_of(observed, guess)
         found = refine(coarse, guess, range(len(NAMES)), scales, noise)
         if best is None or found.around.cost < best.around.cost:
             best, best_scales = found, scales
@@ -236,19 +222,6 @@ def _first(
     if best is None:
         raise InvalidRequest('no guess at the model has a meaning')
     return best, best_scales
-
-
-def _scales(observed: Observed, guess: FloatArray) -> FloatArray:
-    """Return how far each parameter may reasonably be off, shape (8,)."""
-    effort = float(np.std(observed.effort)) + 1e-12
-    rate = float(np.std(observed.rates[:, 0] - observed.base)) + 1e-9
-    scales = np.abs(guess)
-    critical = 2 * sqrt(guess[STIFFNESS] * guess[LAST])
-    scales[DAMPING] = max(scales[DAMPING], LIGHT_DAMPING * critical)
-    scales[VISCOUS] = max(scales[VISCOUS], FRICTION_SHARE * effort / rate)
-    scales[COULOMB] = max(scales[COULOMB], FRICTION_SHARE * effort)
-    scales[[OFFSET, DELAY]] = OFFSET_SCALE, DELAY_SCALE
-    return scales
 
 
 def _interpolated(
@@ -334,7 +307,7 @@ def _result(
     trust: Trust,
 ) -> ModelFit:
     """Put numbers into words."""
-    believed, values = _vector(start), found.parameters[: len(NAMES)]
+    believed, values = vector_of(start), found.parameters[: len(NAMES)]
     scale = 1.0
     if trust is Trust.INERTIA and BOTH in free:
         scale = float(believed[BOTH] / values[BOTH])
@@ -359,7 +332,7 @@ def _estimates(
     start: PlanarArm, values: FloatArray, errors: FloatArray, free: list[int]
 ) -> tuple[ParameterEstimate, ...]:
     """Return the estimates of the last two links."""
-    believed, stds = _vector(start), np.sqrt(np.diag(errors))
+    believed, stds = vector_of(start), np.sqrt(np.diag(errors))
     names = list(NAMES)
     for index in (VISCOUS, COULOMB):
         names[index] += f'[{start.n - 1}]'
