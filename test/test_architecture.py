@@ -40,7 +40,7 @@ WINGS = {
     'insensitive': 'motion_law arm',
     'peak': 'motion_law insensitive arm',
     'planning': 'motion_law insensitive peak arm',
-    'session': 'planning tracking arm',
+    'session': 'planning tracking model_fit arm',
     'plant': 'arm',
     'monitor': 'model_fit arm',
     'tracking': 'arm',

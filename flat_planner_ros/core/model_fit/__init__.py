@@ -24,6 +24,7 @@ from flat_planner_ros.core.model_fit.information import (
 )
 from flat_planner_ros.core.model_fit.last_links import NAMES
 from flat_planner_ros.core.model_fit.measurements import Measurements
+from flat_planner_ros.core.model_fit.weak_form import seen_stiffness
 
 __all__ = [
     'fit_model',
@@ -35,5 +36,6 @@ __all__ = [
     'ModelFit',
     'NAMES',
     'ParameterEstimate',
+    'seen_stiffness',
     'Trust',
 ]

@@ -19,9 +19,10 @@ The rows are multiplied by smooth windows and integrated by parts, so that no no
 differentiated: the derivatives fall on the windows (weak form, Shinbrot 1957).
 """
 
+from math import inf
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import coulomb_share, FloatArray
+from flat_planner_ros.core.arm import coulomb_share, FloatArray, PlanarArm
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
     COULOMB,
@@ -119,6 +120,39 @@ def weak_guess(signals: LinkSignals, period: float) -> FloatArray:
     guess[[VISCOUS, COULOMB]] = viscous, coulomb
     guess[[OFFSET, DELAY]] = held / stiffness, shift * sample
     return guess
+
+
+def seen_stiffness(
+    times: FloatArray, last: FloatArray, passive: FloatArray, arm: PlanarArm, period: float
+) -> tuple[float, float]:
+    """
+    Return the passive joint's stiffness and its standard error, as shares of a model's [-].
+
+    By the row of the last link alone, whatever moves the other joints. The error is infinite where
+    the samples are too few.
+
+    Parameters
+    ----------
+    times
+        Ascending, shape (m,) [s].
+    last, passive
+        Absolute angle of the last link and angle of the passive joint, shape (m,) [rad].
+    arm
+        The model; its inertias count as true.
+    period
+        Rough period of the free passive joint [s].
+
+    """
+    even = np.linspace(times[0], times[-1], len(times))
+    windows = _Windows(even, WINDOW * period)
+    if len(windows(even)) <= 2:
+        return 1.0, inf
+    columns = np.column_stack([windows(np.interp(even, times, passive), k) for k in (0, 1)])
+    target = -arm.inertia_star.last * windows(np.interp(even, times, last), 2)
+    (stiffness, _), left = _least_squares(columns, target)
+    # Windows that overlap err alike.
+    spread = OVERLAP * left / (len(target) - 2) * np.linalg.pinv(columns.T @ columns)[0, 0]
+    return float(stiffness / arm.stiffness), float(np.sqrt(spread) / arm.stiffness)
 
 
 def _momentum(signals: LinkSignals, windows: _Windows, shift: int) -> tuple[FloatArray, float]:

@@ -19,6 +19,7 @@ from collections.abc import Iterable
 from math import tau
 
 from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, PlanarArm
+from flat_planner_ros.core.model_fit import seen_stiffness
 from flat_planner_ros.core.planning import PlanSamples
 from flat_planner_ros.core.session.timeline import Motion
 from flat_planner_ros.core.tracking import ArmObserver, Estimate
@@ -41,6 +42,12 @@ RELATIVE_BANDWIDTH = 4.0
 
 FASTEST = 0.5
 """Bandwidth of the observer times the spacing of samples at most [-]."""
+
+PRIOR_ERROR = 0.25
+"""Error of the model's stiffness that is expected before a swing is seen [-]."""
+
+LARGEST_CHANGE = 0.6
+"""A stiffness further from the model's is not believed [-]."""
 
 
 class Inputs:
@@ -112,6 +119,7 @@ class RecentStates:
             return None
         period = float(np.diff(times).mean())
         bandwidth = min(RELATIVE_BANDWIDTH * frequency, FASTEST / period)
+        arm = _as_it_swings(arm, seen, swing)
         observer = ArmObserver(arm, period, bandwidth, held=inputs.is_held)
         observer.restart(seen[0])
         known = inputs.at(times + 0.5 * period)
@@ -132,3 +140,17 @@ class RecentStates:
         since = self._samples[-1].time - duration
         seen = [s for s in self._samples if s.time >= since and np.isfinite(s.positions).all()]
         return seen[:: -(-len(seen) // LOOKED_AT) or 1]
+
+
+def _as_it_swings(arm: PlanarArm, seen: list[JointSample], swing: float) -> PlanarArm:
+    """
+    Return the model with the stiffness that the last swing shows, as far as it shows one.
+
+    Carried forward by a spring 10 % off, a swing would soon be 5 % of itself beside the arm.
+    """
+    times = np.array([sample.time for sample in seen])
+    angles = np.array([sample.positions for sample in seen])
+    factor, error = seen_stiffness(times, angles.sum(axis=1), angles[:, -1], arm, swing)
+    trust = 1.0 / (1.0 + (error / PRIOR_ERROR) ** 2)
+    factor = 1.0 + trust * (factor - 1.0)
+    return arm.scaled(stiffness=factor) if abs(factor - 1.0) < LARGEST_CHANGE else arm

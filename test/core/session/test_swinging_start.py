@@ -19,6 +19,7 @@ from math import pi
 
 from core.conftest import ARM, envelope
 from flat_planner_ros.core.arm import Drive, JointSample
+from flat_planner_ros.core.model_fit import seen_stiffness
 from flat_planner_ros.core.planning import (
     JointLimits,
     PlanningOptions,
@@ -26,7 +27,7 @@ from flat_planner_ros.core.planning import (
     RequestRejected,
     Strategy,
 )
-from flat_planner_ros.core.plant import EffortProfile, SimulatedArm
+from flat_planner_ros.core.plant import DriveSettings, EffortProfile, SimulatedArm
 from flat_planner_ros.core.session import (
     Goal,
     GoalPoint,
@@ -100,6 +101,38 @@ class Bench:
         self.look(motion.end + rest + PERIOD - self.now)
 
 
+class ServoBench(Bench):
+    """The same with an arm under servos, let go with its passive joint beside zero."""
+
+    def __init__(self, true=ARM, **changes):
+        """Look at it for a swing."""
+        options = replace(changes.pop('options', SETTINGS.options), drive=Drive.POSITION)
+        self.session = PlannerSession(replace(SETTINGS, options=options, **changes))
+        self.random = np.random.default_rng(3)
+        drives = DriveSettings(drive=Drive.POSITION)
+        self.arm = SimulatedArm(true, position=np.array([0.4, 1.05 * SWING]), drives=drives)
+        self.look(1.2 * ONE_SWING)
+
+    @property
+    def amplitude(self):
+        """Return the envelope of the passive joint while the servo holds the other one [rad]."""
+        arm = self.arm
+        return envelope(arm.arm, arm.position[1], arm.velocity[1], held=True)
+
+    def play(self, motion, rest=0.0):
+        """Carry the motion's positions out, and go on for a time [s]."""
+        samples = motion.samples
+        profile = EffortProfile(
+            start=motion.start - NOW,
+            times=samples.times,
+            efforts=np.zeros((len(samples.times), 1)),
+            positions=samples.positions[:, :1],
+            velocities=samples.velocities[:, :1],
+        )
+        self.arm.command(profile, self.arm.time)
+        self.look(motion.end + rest + PERIOD - self.now)
+
+
 def test_a_goal_given_to_a_swinging_arm_ends_at_rest():
     bench = Bench()
     assert bench.amplitude > SWING
@@ -111,13 +144,40 @@ def test_a_goal_given_to_a_swinging_arm_ends_at_rest():
     assert bench.arm.position[0] == pytest.approx(1.0, abs=4e-3)
 
 
-@pytest.mark.parametrize('factor', [0.9, 1.1])
-def test_a_spring_wrong_by_a_tenth_leaves_a_fifth_and_then_next_to_nothing(factor):
-    bench = Bench(ARM.scaled(stiffness=factor, damping=factor))
+@pytest.mark.parametrize('bench_of', [Bench, ServoBench])
+@pytest.mark.parametrize(
+    ('factor', 'strategy', 'shares'),
+    [
+        (0.9, Strategy.MIN_CONTROL_EFFORT, (0.12, 0.02)),
+        (1.1, Strategy.INSENSITIVE, (0.02, 0.02)),
+    ],
+)
+def test_a_spring_wrong_by_a_tenth_leaves_a_ninth_and_then_next_to_nothing(
+    bench_of, factor, strategy, shares
+):
+    options = replace(SETTINGS.options, strategy=strategy)
+    bench = bench_of(ARM.scaled(stiffness=factor, damping=factor), options=options)
     before = bench.amplitude
-    for share in (0.22, 0.03):
-        bench.play(bench.session.settle(bench.now), rest=ONE_SWING)
+    for share in shares:
+        motion = bench.session.settle(bench.now)
+        if motion is not None:
+            bench.play(motion, rest=ONE_SWING)
         assert bench.amplitude < share * before
+
+
+def test_what_a_swing_shows_of_the_spring_is_believed_as_far_as_it_shows_it():
+    """A swing of the size of the noise shows nothing; the model's spring then counts."""
+    random = np.random.default_rng(2)
+    times = np.arange(200) * PERIOD
+    mode = ARM.scaled(stiffness=0.9).natural_mode()
+    for size, least, most in ((0.3, 0.0, 0.01), (1e-2, 0.01, 0.15), (0.0, 1.0, np.inf)):
+        passive = size * np.cos(mode.frequency * times)
+        link = -ARM.inertia_star.last / ARM.inertia_star.both * passive
+        passive = passive + NOISE * random.standard_normal(200)
+        link = link + NOISE * random.standard_normal(200)
+        factor, error = seen_stiffness(times, link + passive, passive, ARM, ONE_SWING)
+        assert least < error < most
+        assert abs(factor - 0.9) < 3.0 * error
 
 
 def test_settling_takes_the_shortest_time_within_the_limits():
