@@ -53,6 +53,7 @@ MESSAGES_ALLOWED = {
     'joint_states.py': 'the same for joint states, which come in many forms',
     'diagnostics.py': 'the same for verdicts and reports',
     'estimates.py': 'the same for estimates, reported and adopted',
+    'tracker_word.py': 'what a tracker says of itself, as others hear it',
     '*_node.py': 'the types of its topics and services',
     'page_commands.py': 'goals and services of the live view',
     'status_news.py': 'verdicts and reports as the live view shows them',

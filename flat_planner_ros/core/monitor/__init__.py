@@ -22,6 +22,7 @@ from flat_planner_ros.core.monitor.adoption import (
     ReportedEstimate,
     ReportedModel,
 )
+from flat_planner_ros.core.monitor.feedback_times import FeedbackTimes
 from flat_planner_ros.core.monitor.identification import (
     ActuatedJoints,
     identify,
@@ -39,6 +40,7 @@ __all__ = [
     'Adoption',
     'AdoptionRefused',
     'Estimate',
+    'FeedbackTimes',
     'fit_oscillation',
     'identify',
     'joint_indices',

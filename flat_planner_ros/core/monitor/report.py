@@ -14,13 +14,14 @@
 
 """The report on what a motion leaves behind."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.monitor.clipping import clipped_remark
 from flat_planner_ros.core.monitor.course import compare, Course, judge_arrival
 from flat_planner_ros.core.monitor.doubtful_samples import doubt_of_times, seen_oscillation
+from flat_planner_ros.core.monitor.feedback_times import FeedbackTimes
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
 from flat_planner_ros.core.monitor.model_estimate import estimate_model, ModelEstimate
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Record
@@ -34,6 +35,15 @@ EFFORT_GAP = 0.1
 
 WINDOW_GAP = 0.1
 """Longest delay of the first sample after the motion left unsaid, relative to the window [-]."""
+
+RELEASE = 0.1
+"""Time after the motion that feedback has to let go of the arm, relative to the window [-]."""
+
+DAMPED = 'feedback damps what is left: it is not the free oscillation of the arm'
+"""Why nothing of the arm is told by an oscillation."""
+
+TRACKED = 'carried out with feedback'
+"""What is said of such motions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,6 +89,8 @@ class VibrationReport:
     clock_offset
         By how much the stamps of the samples were ahead of the plan's clock [s], ``None`` if they
         were not.
+    is_tracked
+        Whether feedback moved the arm.
 
     """
 
@@ -100,6 +112,7 @@ class VibrationReport:
     course: Course | None = None
     clock_offset: float | None = None
     model: ModelEstimate | None = None
+    is_tracked: bool = False
 
     @property
     def is_settled(self) -> bool:
@@ -118,6 +131,7 @@ def assess(
     until: float,
     clock: SampleClock,
     *,
+    feedback: FeedbackTimes,
     cause: str = '',
     stale: bool = False,
 ) -> VibrationReport:
@@ -136,6 +150,8 @@ def assess(
         Time at which the window is cut at the latest [s].
     clock
         Of the samples.
+    feedback
+        When it acted.
     cause
         Why it is cut, if it is.
     stale
@@ -148,6 +164,13 @@ def assess(
 
     """
     until = min(until, motion.end + settings.window)
+    last = motion.end + settings.window  # of the plan's clock, as feedback is
+    is_tracked = feedback.has_acted(motion.start, last)
+    is_damped = feedback.has_acted(motion.end + RELEASE * settings.window, last)
+    # What the model expects is the free arm's.
+    judged = settings
+    if is_damped:
+        judged = replace(settings, expected_frequency=None, expected_damping_ratio=None)
     course = compare(motion, *measured.positions(motion.start, until))
     # All that follows is about the time at which the arm did it, not about what was planned.
     done = clock.carried_out(motion, course)
@@ -158,8 +181,11 @@ def assess(
     if doubt:
         fit = OscillationFit(samples=times.size, reason=doubt)
     else:
-        fit, foreign = seen_oscillation(times, errors[:, -1], done.end, settings)
-    estimate = _estimate(times - done.end, errors, fit, settings)
+        fit, foreign = seen_oscillation(times, errors[:, -1], done.end, judged)
+    if is_damped:
+        estimate = None if settings.arm is None else StiffnessEstimate(reason=DAMPED)
+    else:
+        estimate = _estimate(times - done.end, errors, fit, settings)
     model = _model(done, measured.motors, until, settings, doubt)
     frequency = fit.frequency or settings.expected_frequency
     settling = _settling_time(times - done.end, errors[:, -1], settings.settling_band, frequency)
@@ -191,8 +217,9 @@ def assess(
     severity = Level.worst(
         (arrival.level, _level(fit, settings), Level.WARN if foreign or clipped else Level.OK)
     )
-    said = (clock.remark(course), arrival.remark, clipped, foreign)
-    sentence = (*said, _verdict(fit, settings), *remarks)
+    tracked = TRACKED if is_tracked else ''
+    said = (clock.remark(course), arrival.remark, clipped, foreign, tracked)
+    sentence = (*said, _verdict(fit, judged), *remarks)
     return VibrationReport(
         level=Level.STALE if stale else severity,
         message='; '.join(filter(None, sentence)),
@@ -200,8 +227,8 @@ def assess(
         end_time=motion.end,
         joint=motion.joint_names[-1],
         fit=fit,
-        frequency_expected=settings.expected_frequency,
-        damping_expected=settings.expected_damping_ratio,
+        frequency_expected=judged.expected_frequency,
+        damping_expected=judged.expected_damping_ratio,
         settling_time=settling,
         joint_names=motion.joint_names,
         final_error=final_error,
@@ -212,6 +239,7 @@ def assess(
         course=course,
         clock_offset=clock.ahead(course) if clock.is_other(course) else None,
         model=model,
+        is_tracked=is_tracked,
     )
 
 

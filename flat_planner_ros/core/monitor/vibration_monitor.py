@@ -25,6 +25,7 @@ from flat_planner_ros.core.arm import (
     OffsetFilter,
     SampleTable,
 )
+from flat_planner_ros.core.monitor.feedback_times import FeedbackTimes
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Residual
 from flat_planner_ros.core.monitor.report import assess, VibrationReport
 from flat_planner_ros.core.monitor.sample_checks import (
@@ -70,6 +71,11 @@ class VibrationMonitor:
     settings
         Window, tolerances and expectations; may be replaced at any time.
 
+    Attributes
+    ----------
+    feedback
+        When somebody's feedback acts on the arm, as far as it is told.
+
     """
 
     def __init__(self, settings: MonitorSettings) -> None:
@@ -90,6 +96,7 @@ class VibrationMonitor:
         self._dropped_told = 0
         self._set_back = 0.0
         self._reports: list[VibrationReport] = []
+        self.feedback = FeedbackTimes()
         self._measured = Measured(0)
         self._offset = OffsetFilter()
         self._correction = 0.0
@@ -442,7 +449,14 @@ class VibrationMonitor:
         offset = self._offset.offset if self._is_own_clock else None
         clock = SampleClock(offset, self._correction)
         return assess(
-            motion, self.settings, self._measured, until, clock, cause=cause, stale=stale
+            motion,
+            self.settings,
+            self._measured,
+            until,
+            clock,
+            feedback=self.feedback,
+            cause=cause,
+            stale=stale,
         )
 
 

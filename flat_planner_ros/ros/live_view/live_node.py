@@ -27,10 +27,11 @@ from flat_planner_ros.ros.live_view.feed import Feed
 from flat_planner_ros.ros.live_view.node_poll import NodePoll, PATIENCE
 from flat_planner_ros.ros.live_view.page_commands import PageCommands
 from flat_planner_ros.ros.live_view.page_settings import choices
-from flat_planner_ros.ros.live_view.status_news import state_of, tracker_of, Verdicts
+from flat_planner_ros.ros.live_view.status_news import state_of, Verdicts
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.tracker_word import tracker_of
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
@@ -203,7 +204,7 @@ class LiveNode(GuardedNode):
         tracker = tracker_of(msg, self.get_namespace())
         if tracker is not None:
             self._tracker_heard = monotonic()
-            self.feed.put('tracker', tracker)
+            self.feed.put('tracker', state_of(tracker))
 
     def _on_look(self) -> None:
         """Forget a tracker that says nothing any more."""

@@ -20,7 +20,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.ros.live_view.feed import Feed
-from flat_planner_ros.ros.wire import interfaces, stamps
+from flat_planner_ros.ros.wire import stamps
 from rclpy.task import Future
 
 VERDICTS = 20
@@ -114,15 +114,6 @@ def state_of(status: DiagnosticStatus) -> dict[str, Any]:
         'text': status.message[:TEXT_LIMIT],
         'values': values_of(status),
     }
-
-
-def tracker_of(msg: DiagnosticArray, namespace: str) -> dict[str, Any] | None:
-    """Return the state of a namespace's tracker, None where a message is of something else."""
-    name = f'{namespace.rstrip("/")}/{interfaces.TRACKER}'
-    for status in msg.status:
-        if status.name == interfaces.TRACKER_NAME and status.hardware_id in ('', name):
-            return state_of(status)
-    return None
 
 
 def values_of(status: DiagnosticStatus) -> dict[str, str]:

@@ -39,6 +39,7 @@ from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, diagnostics, estimates, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.tracker_word import hear_tracker
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -87,6 +88,10 @@ class MonitorNode(GuardedNode):
         status = interfaces.topic_of(interfaces.PLANNER, interfaces.STATUS)
         self.create_subscription(
             DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY
+        )
+        # For the feedback of a tracker, which is not to be taken for the arm's own damping.
+        self.create_subscription(
+            DiagnosticArray, interfaces.DIAGNOSTICS, self._on_health, interfaces.RELIABLE
         )
         self._watch = GraphWatch(
             self, self._log, [plan], [interfaces.JOINT_STATES], is_listening=True
@@ -177,6 +182,10 @@ class MonitorNode(GuardedNode):
                     raise InvalidParameter(result.reason)
         except FlatPlannerError as error:
             self._log.warning(f"the planner's model is not followed: {error}")
+
+    def _on_health(self, msg: DiagnosticArray) -> None:
+        """Learn when a tracker moves the arm."""
+        hear_tracker(msg, self.get_namespace(), self._monitor.feedback)
 
     def _on_tick(self) -> None:
         """Notice silence, unless the node itself has been busy: samples may be waiting then."""

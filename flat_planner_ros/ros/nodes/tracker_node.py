@@ -62,7 +62,7 @@ class TrackerNode(GuardedNode):
         self._joints = settings.joints
         self._tracker = Tracker(settings.arm, settings.tracker)
         self._renewal = TrackerRenewal(settings.arm, settings.tracker)
-        self._fault = ''
+        self._fault, self._phase = '', self._tracker.phase
         self._reader = JointStateReader(settings.joints, settings.joint_states)
         efforts = interfaces.EFFORT_COMMANDS
         self._efforts = self.create_publisher(Float64MultiArray, efforts, interfaces.RELIABLE)
@@ -80,7 +80,7 @@ class TrackerNode(GuardedNode):
             self._efforts,
             on_elder=self._on_elder,
             on_rival=self._on_rival,
-            introduce=self._on_health,
+            introduce=self._introduce,
         )
         self._health = self.create_publisher(
             DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE
@@ -165,6 +165,10 @@ class TrackerNode(GuardedNode):
         refusal = self._renewal.take_refusal()
         if refusal:
             self._log.warning(refusal)
+        self._introduce()
+
+    def _introduce(self) -> None:
+        """Publish the present state."""
         tracker = self._tracker
         status = diagnostics.tracker_status(
             tracker.phase.value,
@@ -191,6 +195,9 @@ class TrackerNode(GuardedNode):
         if fault:
             self._fault = fault
             self._log.error(fault)
+        if self._tracker.phase is not self._phase:
+            self._phase = self._tracker.phase
+            self._introduce()
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -54,7 +54,9 @@ OURS = {
         interfaces.REFERENCE: (JOINT_STATE, interfaces.RELIABLE),
         interfaces.STATUS: (DIAGNOSTIC_ARRAY, interfaces.LATCHED_HISTORY),
     },
-    interfaces.PLANT: {},
+    interfaces.PLANT: {
+        interfaces.PUSH: ('std_msgs/msg/Float64MultiArray', interfaces.RELIABLE),
+    },
     interfaces.MONITOR: {
         interfaces.RESIDUAL: (JOINT_STATE, interfaces.RELIABLE),
         interfaces.REPORT: (DIAGNOSTIC_ARRAY, interfaces.LATCHED),
@@ -72,6 +74,7 @@ Verdicts echo them.
 
 SHARED = {
     interfaces.JOINT_STATES: (JOINT_STATE, interfaces.RELIABLE),
+    interfaces.DIAGNOSTICS: (DIAGNOSTIC_ARRAY, interfaces.RELIABLE),
     interfaces.CLOCK: ('rosgraph_msgs/msg/Clock', interfaces.RELIABLE),
     PARAMETER_EVENTS: ('rcl_interfaces/msg/ParameterEvent', interfaces.RELIABLE),
 }

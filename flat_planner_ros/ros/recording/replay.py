@@ -34,15 +34,25 @@ from flat_planner_ros.ros.recording.recent_samples import RecentSamples, table_o
 from flat_planner_ros.ros.recording.recording import Recording
 from flat_planner_ros.ros.recording.storage import Entry
 from flat_planner_ros.ros.wire import conversions, stamps
-from flat_planner_ros.ros.wire.interfaces import JOINT_STATES, MONITOR, PLAN, PLANNER, topic_of
+from flat_planner_ros.ros.wire.interfaces import (
+    DIAGNOSTICS,
+    JOINT_STATES,
+    MONITOR,
+    PLAN,
+    PLANNER,
+    topic_of,
+)
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from flat_planner_ros.ros.wire.state_table import read_states
+from flat_planner_ros.ros.wire.tracker_word import hear_tracker
 import numpy as np
 from rclpy.parameter import Parameter
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+
+DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
 
 SILENCE = 1.001
 """Time after the last sample of a recording, relative to what counts as silence [-]."""
@@ -64,6 +74,11 @@ class Sources:
 
     plan: str
     joint_states: str
+
+    @property
+    def namespace(self) -> str:
+        """Return the namespace of the nodes, without a slash at its end."""
+        return self.plan.removesuffix('/' + topic_of(PLANNER, PLAN))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,7 +137,6 @@ def find_sources(
 
 def recorded_settings(recording: Recording, sources: Sources) -> list[tuple[int, MonitorSettings]]:
     """Return the monitor's settings as recorded, each with the time from which it held [ns]."""
-    namespace = sources.plan.removesuffix('/' + topic_of(PLANNER, PLAN))
     # A recording of an earlier version does not know all of them.
     defaults = {
         row.name: row.default
@@ -132,7 +146,7 @@ def recorded_settings(recording: Recording, sources: Sources) -> list[tuple[int,
     known = {row.name for row in monitor_parameters.ROWS}
     settings = []
     for time, node, text in recording.parameters:
-        if node == f'{namespace}/{MONITOR}':
+        if node == f'{sources.namespace}/{MONITOR}':
             values = {k: v for k, v in json.loads(text).items() if k in known}
             try:
                 settings.append((time, monitor_parameters.build({**defaults, **values})))
@@ -169,8 +183,10 @@ def replay(
         Is given the entries of these topics, in the order of time with the others.
 
     """
-    player = _Player(recording, settings, remark)
+    player = _Player(recording, sources, settings, remark)
     own = {sources.plan, sources.joint_states}
+    if recording.topics.get(DIAGNOSTICS) == DIAGNOSTIC_ARRAY:
+        own.add(DIAGNOSTICS)
     for entries in stretches(recording.batches({*own, *topics})):
         if entries[0].topic in own:
             yield from player.take(entries)
@@ -202,9 +218,11 @@ class _Player:
     def __init__(
         self,
         recording: Recording,
+        sources: Sources,
         settings: Sequence[tuple[int, MonitorSettings]],
         remark: Callable[[str], object],
     ) -> None:
+        self._namespace = sources.namespace
         self.monitor = VibrationMonitor(settings[0][1])
         self._changes = list(settings[1:])
         self._recording = recording
@@ -238,6 +256,9 @@ class _Player:
             self._apply(self._changes.pop(0)[1])
         msg = self._recording.read(entry)
         if msg is None:
+            return
+        if entry.topic == DIAGNOSTICS:
+            hear_tracker(msg, self._namespace, self.monitor.feedback)
             return
         take = self._take_plan if entry.kind == JOINT_TRAJECTORY else self._take_state
         with suppress(FlatPlannerError):

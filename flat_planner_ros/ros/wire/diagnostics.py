@@ -314,6 +314,7 @@ def _report_values(report: VibrationReport) -> Values:
         'samples': report.samples,
         'fit_rms': report.fit.fit_rms,
         'clock_offset': report.clock_offset,
+        'tracked': report.is_tracked or None,
         **_estimate_values(report.estimate),
         **_whole_values(report.model),
     }
