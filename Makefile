@@ -6,7 +6,10 @@ ARGS ?=
 
 # What is installed without ROS, pinned and hashed; "make LOCK=" takes the ranges of setup.py instead.
 LOCK ?= requirements.lock
+TEST_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-test.lock))
 DOCS_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-docs.lock))
+COMPILE = $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header --no-annotate \
+  --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple
 PIP = $(BIN)/python -m pip install --quiet --progress-bar off
 SETUPTOOLS := 'setuptools>=70.1,<80'
 comma := ,
@@ -27,6 +30,7 @@ PYTEST := import sys; sys.path[:] = filter(None, sys.path); import pytest; sys.e
 MADE := $(VENV)/made-for-$(if $(PYTHON),$(subst /,_,$(PYTHON))-)$(or $(ROS),wheels)
 DEPENDENCIES := $(VENV)/dependencies-installed
 PACKAGE := $(VENV)/package-installed
+TESTING := $(VENV)/testing-installed
 PEERS := $(VENV)/peers-installed
 SITE := $(VENV)/site-installed
 SOURCES := $(shell find flat_planner_ros config launch resource -type f -not -name '*.pyc' | sort)
@@ -55,11 +59,11 @@ fuzz: export ALL_CASES := 1
 fuzz: export FUZZ_CASES ?= 100000
 fuzz: export TRUTH_CASES ?= 1000
 fuzz: export RANDOM_MESSAGES ?= 10000
-fuzz: install  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
+fuzz: install $(TESTING)  ## 100,000 random motions against multiple precision, 10,000 random messages of each kind
 	$(BIN)/python -c '$(PYTEST)' -s test/fuzz test/core test/ros/wire test/ros/graph/test_controller_conformance.py $(ARGS)
 
 soak: export PYTHONUNBUFFERED := 1
-soak: install  ## random motions with faults for a long time, MINUTES=30 by default
+soak: install $(TESTING)  ## random motions with faults for a long time, MINUTES=30 by default
 	$(BIN)/python test/soak/run.py --minutes $(or $(MINUTES),30) $(ARGS)
 
 bench: install $(PEERS)  ## speed beside other libraries, and of the nodes; benchmarks/results.md
@@ -77,7 +81,7 @@ examples: install  ## run examples/, which renews the pictures in docs/images/ex
 	  MPLBACKEND=Agg $(BIN)/python $$file build/examples/$$(basename $$file .py).png || exit 1; done
 	cp build/examples/*.png docs/images/examples/
 
-lint: install  ## ruff and mypy only
+lint: install $(TESTING)  ## ruff and mypy only
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
 	@if $(BIN)/python -c '$(HAS_TYPES)'; then set -x; $(BIN)/python -m mypy; \
@@ -111,16 +115,13 @@ $(DEPENDENCIES): setup.py pyproject.toml $(LOCK) $(MADE)
 	echo '$(LOCK) cannot be installed here ($(VENV)/lock.log); taking the ranges of setup.py' >&2;) \
 	$(PIP) $(SETUPTOOLS) \
 	  $(if $(ROS),"numpy==$$(python3 -c 'import numpy; print(numpy.__version__)')") \
-	  '.[$(if $(ROS),,jazzy$(comma)lint$(comma))plot,test]' && touch $@
+	  '.[$(if $(ROS),,jazzy$(comma))plot]' && touch $@
 
-lock: $(MADE)  ## renew requirements.lock from the ranges of setup.py
+lock: $(MADE)  ## renew the requirements*.lock from the ranges of setup.py
 	$(PIP) '.[lock]'
-	echo $(SETUPTOOLS) | $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header \
-	  --no-annotate --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple \
-	  --extra jazzy --extra lint --extra plot --extra test setup.py - -o requirements.lock
-	$(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header --no-annotate \
-	  --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple \
-	  --extra docs --constraint requirements.lock setup.py -o requirements-docs.lock
+	echo $(SETUPTOOLS) | $(COMPILE) --extra jazzy --extra plot setup.py - -o requirements.lock
+	$(COMPILE) --extra lint --extra test --constraint requirements.lock setup.py -o requirements-test.lock
+	$(COMPILE) --extra docs --constraint requirements.lock setup.py -o requirements-docs.lock
 
 # The comparison goes on without libraries that cannot be had here.
 $(PEERS): setup.py $(DEPENDENCIES)
@@ -130,14 +131,22 @@ $(PEERS): setup.py $(DEPENDENCIES)
 	@rm -rf build/lib build/bdist.* *.egg-info
 	@touch $@
 
-# As DEPENDENCIES: what the lock lists by its hashes, or the ranges of setup.py.
+# What more the tests and the site need. As DEPENDENCIES: what a lock lists by its hashes, or the
+# ranges of setup.py.
+define install_more
+@if [ -n "$(2)" ] && $(PIP) --require-hashes -r $(2) 2>$(VENV)/$(1)-lock.log; then touch $@; exit 0; fi; \
+if grep -i 'do not match the hashes' -A 8 $(VENV)/$(1)-lock.log 2>/dev/null >&2; then exit 1; fi; \
+$(PIP) "numpy==$$($(BIN)/python -c 'import numpy; print(numpy.__version__)')" '.[$(3)]' || exit 1
+@rm -rf build/lib build/bdist.* *.egg-info
+@touch $@
+endef
+
+$(TESTING): setup.py requirements-test.lock $(DEPENDENCIES)
+	@echo 'installing what the tests need into $(VENV) (about a minute)'
+	$(call install_more,test,$(TEST_LOCK),$(if $(ROS),,lint$(comma))test)
+
 $(SITE): setup.py requirements-docs.lock $(DEPENDENCIES)
-	@if [ -n "$(DOCS_LOCK)" ] && $(PIP) --require-hashes -r $(DOCS_LOCK) 2>$(VENV)/docs-lock.log; then touch $@; exit 0; fi; \
-	if grep -i 'do not match the hashes' -A 8 $(VENV)/docs-lock.log 2>/dev/null >&2; then exit 1; fi; \
-	$(BIN)/python -m pip install --quiet --progress-bar off \
-	  "numpy==$$($(BIN)/python -c 'import numpy; print(numpy.__version__)')" '.[docs]'
-	@rm -rf build/lib build/bdist.* *.egg-info
-	@touch $@
+	$(call install_more,docs,$(DOCS_LOCK),docs)
 
 # A removed source changes no time stamp, hence the list; and it would live on in build/lib.
 $(PACKAGE): $(DEPENDENCIES) $(VENV)/sources package.xml setup.cfg $(SOURCES)

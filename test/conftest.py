@@ -26,6 +26,17 @@ PACKAGE = 'flat_planner_ros'
 ROS_TESTS = CHECKOUT / 'test' / 'ros'
 CORE_TESTS = CHECKOUT / 'test' / 'core'
 
+KNOWN_SKIPS = {
+    'launch_ros': 'comes with ROS only',
+    'ros2launch': 'comes with ROS only',
+    'ament_copyright': 'comes with ROS only',
+    'no Chromium': 'a program of the system',
+    'no Node.js': 'a program of the system',
+    'control_msgs': 'comes with ROS, or is made where there is a compiler',
+    'no right to make network namespaces': 'a right that root has',
+}
+"""What the reason of a skip may name, and why it is not mended by installing more."""
+
 settings.register_profile('ci', derandomize=True, deadline=None, database=None, print_blob=True)
 settings.register_profile('local', deadline=None)
 settings.load_profile('ci' if os.environ.get('CI') else 'local')
@@ -57,6 +68,8 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(
             f'{tested} is not the code of this checkout: run "make install" (differing: {names})'
         )
+    if os.environ.get('REQUIRE_ROS') == '1' and not hasattr(config, 'workerinput'):
+        config.pluginmanager.register(_SkipsWatch())
     if ROS_ERROR is not None and os.environ.get('REQUIRE_ROS') == '1':
         raise pytest.UsageError(f'REQUIRE_ROS=1, but rclpy is not usable: {ROS_ERROR}')
 
@@ -66,6 +79,39 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(
         key=lambda item: (CORE_TESTS in item.path.parents, ROS_TESTS not in item.path.parents)
     )
+
+
+class _SkipsWatch:
+    """Makes a run fail whose skips are not all of a known kind."""
+
+    def __init__(self) -> None:
+        """Begin without skips."""
+        self._unknown: set[str] = set()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note the skip of a test."""
+        self._note(report)
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Note the skip of a file."""
+        self._note(report)
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """Fail."""
+        if self._unknown and session.exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter) -> None:
+        """Say which skips are new."""
+        for skip in sorted(self._unknown):
+            terminalreporter.write_line(f'a new kind of skip: {skip}', red=True)
+
+    def _note(self, report: pytest.TestReport | pytest.CollectReport) -> None:
+        if not report.skipped or hasattr(report, 'wasxfail'):
+            return
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        if not any(known in reason for known in KNOWN_SKIPS):
+            self._unknown.add(f'{report.nodeid}: {reason}')
 
 
 class _NeedsRos(pytest.Module):

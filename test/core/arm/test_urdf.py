@@ -258,7 +258,7 @@ def test_link_names_never_clash_with_joint_names():
 
 def test_the_recipe_for_mujoco_works(tmp_path, monkeypatch):
     mujoco = pytest.importorskip('mujoco')
-    text = (Path(__file__).resolve().parent.parent / 'docs' / 'real_robot.md').read_text('utf-8')
+    text = (Path(__file__).resolve().parents[3] / 'docs' / 'real_robot.md').read_text('utf-8')
     (recipe,) = re.findall(r'^```python\n(.*?)^```', text, re.MULTILINE | re.DOTALL)
     description = describe(PAPER)
     monkeypatch.chdir(tmp_path)
