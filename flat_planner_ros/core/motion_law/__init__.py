@@ -37,7 +37,8 @@ from flat_planner_ros.core.motion_law.law import (
     motion_quadrature,
     ScaledLaw,
 )
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, path_cost, PathConditions
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
+from flat_planner_ros.core.motion_law.path_cost import PathCost
 
 __all__ = [
     'BoundaryConditions',
@@ -50,7 +51,7 @@ __all__ = [
     'MAX_DERIVATIVE',
     'motion_quadrature',
     'optimal_path',
-    'path_cost',
+    'PathCost',
     'PathConditions',
     'probes',
     'QuadraticCost',

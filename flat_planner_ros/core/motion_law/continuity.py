@@ -77,6 +77,11 @@ class ContinuitySystem:
     relaxation
         Via points prescribe w + relaxation w' [s].
 
+    Raises
+    ------
+    UncertifiedPlan
+        The conditions are singular in double precision.
+
     """
 
     def __init__(
@@ -106,6 +111,15 @@ class ContinuitySystem:
         self._end = end * columns[-1]  # (6, 12)
         # Derivatives 0 to 6 of every solution at its segment's start and end, (p, 2, 7, 12).
         self._at_ends = np.stack([at_start, at_end], axis=1)[:, :, : CONDITIONS + 1]
+        self._factor()
+
+    def _factor(self) -> None:
+        """Factor the matrix."""
+        from scipy.linalg.lapack import dgbtrf  # here: slow to import, for paths only
+
+        self._factors, self._pivots, failure = dgbtrf(self._banded(), BAND, BAND)
+        if failure:
+            raise UncertifiedPlan('boundary residual', inf, 0.0)
 
     def solve(self, start: FloatArray, steps: FloatArray) -> Amplitudes:
         """
@@ -118,25 +132,53 @@ class ContinuitySystem:
         steps
             Value at the end of every segment less that at its start, shape (p, m).
 
-        Raises
-        ------
-        UncertifiedPlan
-            The conditions are singular in double precision.
-
         """
-        from scipy.linalg.lapack import dgbtrf, dgbtrs  # here: slow to import, for paths only
-
         target = self._target(start, steps)
-        factors, pivots, failure = dgbtrf(self._banded(), BAND, BAND)
-        if failure:
-            raise UncertifiedPlan('boundary residual', inf, 0.0)
-        amplitudes, _ = dgbtrs(factors, BAND, BAND, target, pivots)
+        amplitudes = self._solved(target)
         for _ in range(RESIDUAL_STEPS):
-            residual = target - self._applied(amplitudes)
-            change, _ = dgbtrs(factors, BAND, BAND, residual, pivots)
+            change = self._solved(target - self._applied(amplitudes))
             amplitudes += change
         at_ends = self._at_ends @ self._unscaled(change)[:, None]
         return Amplitudes(self._unscaled(amplitudes), np.abs(at_ends).max(axis=(0, 1)))
+
+    def shifts(self, speeds: FloatArray, jumps: FloatArray) -> FloatArray:
+        """
+        Return how the amplitudes change with the time of each knot, the laws kept in place.
+
+        Parameters
+        ----------
+        speeds
+            Derivative of w + relaxation w' at the knots, shape (p - 1,).
+        jumps
+            After each knot less before it, of w^(10) and w^(11) + relaxation w^(12), shape
+            (2, p - 1).
+
+        Returns
+        -------
+        FloatArray
+            For every segment, solution and knot, shape (p, 12, p - 1).
+
+        References
+        ----------
+        (V10) of docs/derivation.md.
+
+        """
+        count = len(speeds)
+        target = np.zeros((count, SOLUTIONS, count))
+        each = np.arange(count)
+        rows = [(0, -speeds), (1, speeds), (SOLUTIONS - 2, jumps[0]), (SOLUTIONS - 1, jumps[1])]
+        for row, values in rows:
+            target[each, row, each] = values * self._knot_factors[:, row]
+        ends = np.zeros((CONDITIONS, count))
+        inner = target.reshape(-1, count)
+        return self._unscaled(self._solved(np.concatenate([ends, inner, ends])))
+
+    def _solved(self, target: FloatArray) -> FloatArray:
+        """Return the scaled amplitudes that meet scaled conditions, shape (12 p, m)."""
+        from scipy.linalg.lapack import dgbtrs
+
+        solution: FloatArray = dgbtrs(self._factors, BAND, BAND, target, self._pivots)[0]
+        return solution
 
     def _unscaled(self, amplitudes: FloatArray) -> FloatArray:
         """Return amplitudes of the solutions themselves, shape (p, 12, m)."""

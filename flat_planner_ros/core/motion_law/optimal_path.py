@@ -33,6 +33,9 @@ from flat_planner_ros.core.motion_law.extremal import costate, rounded, stationa
 from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE, PiecewiseLaw
 from flat_planner_ros.core.motion_law.segment_bases import segment_bases, SegmentBasis
 import numpy as np
+from numpy.typing import NDArray
+
+BoolArray = NDArray[np.bool_]
 
 PROBES = 8
 """Even times at which each half of a segment is certified, besides those near its ends."""
@@ -123,7 +126,7 @@ def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
         The numbers leave double precision.
 
     """
-    bases, halves, origins, steps, amplitudes = _solved(cost, path)
+    bases, halves, origins, steps, amplitudes, _ = solved_path(cost, path)
     parts = []
     for variable, (origin, step) in enumerate(zip(origins, steps, strict=True)):
         laws = tuple(
@@ -146,17 +149,36 @@ def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
     )
 
 
-class _Solution(NamedTuple):
-    """Bases and half lengths of the segments, values at their starts, steps, and amplitudes."""
+class PathSolution(NamedTuple):
+    """
+    Laws of least cost in terms of the solutions on every segment.
+
+    Attributes
+    ----------
+    bases
+        Solutions of every segment.
+    halves
+        Half the segments' lengths, shape (p,) [s].
+    origins
+        Value at the start of every segment, shape (m, p) [rad].
+    steps
+        Value at its end less that at its start, shape (m, p) [rad].
+    amplitudes
+        Of all solutions.
+    systems
+        The equations of each relaxation, and which variables have it, shape (m,).
+
+    """
 
     bases: list[SegmentBasis]
     halves: FloatArray
     origins: FloatArray
     steps: FloatArray
     amplitudes: Amplitudes
+    systems: list[tuple[ContinuitySystem, BoolArray]]
 
 
-def _solved(cost: QuadraticCost, path: PathConditions) -> _Solution:
+def solved_path(cost: QuadraticCost, path: PathConditions) -> PathSolution:
     """Return the laws of least cost in terms of the solutions on every segment."""
     coefficients = cost.characteristic()
     halves = 0.5 * np.diff(path.edges)
@@ -168,32 +190,7 @@ def _solved(cost: QuadraticCost, path: PathConditions) -> _Solution:
     # segment far from zero loses no digits.
     origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
     steps = path.values - origins
-    return _Solution(bases, halves, origins, steps, _amplitudes(bases, halves, path, steps))
-
-
-@strict_arithmetic()
-def path_cost(cost: QuadraticCost, path: PathConditions) -> tuple[float, FloatArray]:
-    """
-    Return the cost of the laws of least cost, and its slopes by the times of the via points.
-
-    As in `OptimalPath`, but nothing is certified: for searches.
-
-    Raises
-    ------
-    UncertifiedPlan, ArithmeticError
-        As by `optimal_path`.
-
-    """
-    bases, halves, _, steps, amplitudes = _solved(cost, path)
-    powers = halves[:, None, None] ** -np.arange(float(SOLUTIONS))[:, None]
-    tables = ([basis.at_middle for basis in bases], [basis.at_end for basis in bases])
-    middles, ends = (np.array(table) @ amplitudes.values * powers for table in tables)
-    costates = -np.einsum('k,pkm->pm', cost.characteristic()[1:], middles[:, 1::2])
-    start = bases[0].at_start @ amplitudes.values[0] * powers[0]
-    value = np.sum(costates * steps.T) - sum(_share_of_start(cost, jet) for jet in start.T)
-    speeds = ends[:-1, 1] + path.relaxations * ends[:-1, 2]
-    slopes: FloatArray = 2.0 * np.sum(np.diff(costates, axis=0) * speeds, axis=1)
-    return float(value), slopes
+    return PathSolution(bases, halves, origins, steps, *_amplitudes(bases, halves, path, steps))
 
 
 def _certified(
@@ -217,7 +214,7 @@ def _certified(
     before = ends[:-1, 1]
     return OptimalPath(
         laws=(PiecewiseLaw(edges=path.edges, laws=laws),),
-        cost_value=float(costates @ steps - _share_of_start(cost, jets[0][:, 0])),
+        cost_value=float(costates @ steps - share_of_start(cost, jets[0][:, 0])),
         time_slopes=2.0 * np.diff(costates) * (before[:, 1] + relaxation * before[:, 2]),
         boundary_residual=max(
             _relative(correction, peaks[: CONDITIONS + 1]),
@@ -241,17 +238,19 @@ def _reference(coefficients: FloatArray) -> FloatArray:
 
 def _amplitudes(
     bases: Sequence[SegmentBasis], halves: FloatArray, path: PathConditions, steps: FloatArray
-) -> Amplitudes:
+) -> tuple[Amplitudes, list[tuple[ContinuitySystem, BoolArray]]]:
     """Return the amplitudes of all solutions; equal relaxations share one factorisation."""
     values = np.empty((len(bases), SOLUTIONS, len(steps)))
     correction = np.empty((CONDITIONS + 1, len(steps)))
+    systems = []
     for relaxation in np.unique(path.relaxations):
         alike = path.relaxations == relaxation
         system = ContinuitySystem(bases, halves, float(relaxation))
         found = system.solve(path.start[alike, 1:].T, steps[alike].T)
         values[:, :, alike] = found.values
         correction[:, alike] = found.correction
-    return Amplitudes(values, correction)
+        systems.append((system, alike))
+    return Amplitudes(values, correction), systems
 
 
 def _probed(law: ExponentialLaw, basis: SegmentBasis) -> FloatArray:
@@ -313,7 +312,7 @@ def _relative(missed: FloatArray, sizes: FloatArray) -> float:
     return float((missed[missed > 0.0] / sizes[missed > 0.0]).max(initial=0.0))
 
 
-def _share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
+def share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
     """
     Return what a moving start adds to the sum of costates times steps, with the opposite sign.
 

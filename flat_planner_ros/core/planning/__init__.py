@@ -24,7 +24,6 @@ from flat_planner_ros.core.planning.cost_weights import (
 )
 from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
-from flat_planner_ros.core.planning.free_conditions import stop_plan, with_via_times
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import (
@@ -36,6 +35,7 @@ from flat_planner_ros.core.planning.request import (
     ViaPoint,
 )
 from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+from flat_planner_ros.core.planning.stop import stop_plan
 from flat_planner_ros.core.planning.strategies import check_options, OWN_LAWS, shortest_known
 from flat_planner_ros.core.planning.tradeoff import (
     baselines,
@@ -49,6 +49,7 @@ from flat_planner_ros.core.planning.tradeoff import (
     tradeoff_points,
     TradeoffPoint,
 )
+from flat_planner_ros.core.planning.via_times import with_via_times
 
 __all__ = [
     'CONDITIONS',

@@ -20,7 +20,8 @@ from flat_planner_ros.core.arm.errors import InvalidRequest, UncertifiedPlan
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions, extremals
-from flat_planner_ros.core.motion_law.optimal_path import optimal_path, path_cost, PathConditions
+from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
+from flat_planner_ros.core.motion_law.path_cost import PathCost
 from flat_planner_ros.core.motion_law.segment_bases import known_basis
 import numpy as np
 from path_programme import programmed_path
@@ -210,9 +211,34 @@ def test_the_cost_alone_is_that_of_the_laws(costs, name):
     edges, values = np.array([0.0, 0.5, 0.9, 2.6]), np.array([1.0, 0.4, 2.0])
     conditions = path(edges, values, MOVING, RELAXATION)
     found = certified(costs[name], conditions)
-    cost, slopes = path_cost(costs[name], conditions)
-    assert cost == pytest.approx(found.cost_value, rel=1e-9)
-    assert slopes == pytest.approx(found.time_slopes, rel=1e-8)
+    alone = PathCost(costs[name], conditions)
+    assert alone.value == pytest.approx(found.cost_value, rel=1e-9)
+    assert alone.slopes == pytest.approx(found.time_slopes, rel=1e-8)
+
+
+@pytest.mark.parametrize('start', [AT_REST, MOVING], ids=['rest', 'moving'])
+@pytest.mark.parametrize('name', STRATEGIES)
+def test_curvatures_of_the_cost(costs, name, start):
+    """The slopes' own slopes, of two variables of which one is relaxed, by differences."""
+    edges = np.array([0.0, 0.4, 0.9, 1.6, 2.1])
+
+    def cost_at(shifts):
+        return PathCost(
+            costs[name],
+            PathConditions(
+                edges=edges + np.array([0.0, *shifts, 0.0]),
+                start=np.array([start, AT_REST]),
+                values=np.array([[1.0, 0.2, -0.5, 0.1], [0.3, 0.8, 0.2, -0.4]]),
+                relaxations=np.array([RELAXATION, 0.0]),
+            ),
+        )
+
+    step = 1e-5
+    expected = np.array(
+        [(cost_at(row).slopes - cost_at(-row).slopes) / (2.0 * step) for row in step * np.eye(3)]
+    )
+    found = cost_at(np.zeros(3)).curvatures()
+    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_the_work_is_that_of_the_segments(costs):

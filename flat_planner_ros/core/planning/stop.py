@@ -13,49 +13,25 @@
 # limitations under the License.
 
 """
-What a request may leave open, chosen where the cost is least.
+Where a stop comes to rest, chosen where the cost is least.
 
-Times of via points: the path itself is solved exactly for any times, and its cost has a
-derivative with respect to each of them ((V8) of docs/derivation.md); they are refined by a
-quasi-Newton method on the same cost that the strategy minimises, the duration kept.
-
-Final pose of a stop: where the cost is least, the costate that belongs to the value of each
-planned variable is zero at the end ((S2)); it is linear in the final value, so that two laws tell
-where that is.
+There, the costate that belongs to the value of each planned variable is zero at the end ((S2) of
+docs/derivation.md); it is linear in the final value, so that two laws tell where that is.
 """
 
 from dataclasses import replace
-from functools import partial
-from math import inf
 
-from flat_planner_ros.core.arm import FloatArray, OutOfReach, PlanarArm, UncertifiedPlan
+from flat_planner_ros.core.arm import FloatArray, OutOfReach, UncertifiedPlan
 from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     costate,
-    path_cost,
-    PathConditions,
-    QuadraticCost,
 )
 from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.limits import JointLimits
-from flat_planner_ros.core.planning.planner import path_of, plan
-from flat_planner_ros.core.planning.reference_trajectory import problem_of
-from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions, ViaPoint
+from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.planning.strategies import OWN_LAWS, with_quadratic_cost
 import numpy as np
-
-LEAST_SHARE = 0.05
-"""
-Shortest segment, relative to an even share of the duration [-].
-
-Between equal values the optimum would let a segment vanish, and its two points with it.
-"""
-
-GRADIENT_TOLERANCE = 1e-3
-"""Derivative of the cost's logarithm by that of a segment's length at which times are kept [-]."""
-
-MAX_ITERATIONS = 40
-"""Bound on the quasi-Newton steps; the cost has long settled then."""
 
 SHORTEST = 1.0 / 16.0
 """Shortest stop that is considered, in terms of the rest of the motion [-]."""
@@ -71,94 +47,6 @@ REST_DURATION = 0.1
 
 PROBE = 1.0
 """Distance between the two final values that are tried [rad]."""
-
-
-def with_via_times(
-    request: MotionRequest, arm: PlanarArm, options: PlanningOptions
-) -> MotionRequest:
-    """
-    Return a request whose via points have the times at which the motion is cheapest.
-
-    Parameters
-    ----------
-    request
-        Points in their order, and the duration, which is kept; the times of the via points do not
-        matter.
-    arm, options
-        As for `plan`.
-
-    Raises
-    ------
-    FlatPlannerError
-        The arm, the weights or the numbers allow no plan.
-
-    """
-    try:
-        problem = problem_of(arm, options, request.duration)
-        edges = _cheapest_edges(problem.cost, path_of(request, problem))
-    except ArithmeticError as error:
-        raise UncertifiedPlan('boundary residual', inf, 0.0) from error
-    via = tuple(
-        ViaPoint(time=time, values=point.values)
-        for point, time in zip(request.via, edges[1:-1].tolist(), strict=True)
-    )
-    return replace(request, via=via)
-
-
-def _cheapest_edges(cost: QuadraticCost, path: PathConditions) -> FloatArray:
-    """Return edges of a path's segments that make it cheap: no small change of them is cheaper."""
-    from scipy.optimize import minimize  # here: slow to import, and only for goals without times
-
-    duration, count = float(path.edges[-1]), path.values.shape[1]
-    if count == 1:
-        return path.edges
-    lengths = np.linalg.norm(np.diff(path.values, prepend=path.start[:, :1], axis=1), axis=0)
-    if not lengths.any():
-        return np.linspace(0.0, duration, count + 1)
-    # Between constant speed and equal times: the ends are at rest, the rest is passed at speed.
-    guess = np.log(np.maximum(np.sqrt(lengths / lengths.max()), LEAST_SHARE))
-    found = minimize(
-        partial(_log_cost, cost, path),
-        guess - guess.mean(),
-        jac=True,
-        method='BFGS',
-        options={'gtol': GRADIENT_TOLERANCE, 'maxiter': MAX_ITERATIONS},
-    )
-    return _edges(found.x, duration)
-
-
-def _shares(logarithms: FloatArray) -> FloatArray:
-    """Return the parts of the free time that segments take, from any numbers."""
-    parts = np.exp(logarithms - logarithms.max())
-    shares: FloatArray = parts / parts.sum()
-    return shares
-
-
-def _edges(logarithms: FloatArray, duration: float) -> FloatArray:
-    """Return the edges of segments, (V9) of docs/derivation.md."""
-    least = LEAST_SHARE / len(logarithms)
-    inner = np.cumsum(least + (1.0 - LEAST_SHARE) * _shares(logarithms))[:-1]
-    return np.concatenate([[0.0], duration * inner, [duration]])
-
-
-def _log_cost(
-    cost: QuadraticCost, path: PathConditions, logarithms: FloatArray
-) -> tuple[float, FloatArray]:
-    """Return the logarithm of the cost and its gradient."""
-    duration = float(path.edges[-1])
-    edges = _edges(logarithms, duration)
-    value, slopes = path_cost(
-        cost,
-        PathConditions(
-            edges=edges, start=path.start, values=path.values, relaxations=path.relaxations
-        ),
-    )
-    # A longer segment moves all later edges but the last.
-    by_length = np.append(np.cumsum(slopes[::-1])[::-1], 0.0)
-    shares = _shares(logarithms)
-    by_logarithm = shares * (by_length - shares @ by_length)
-    scale = duration * (1.0 - LEAST_SHARE) / value
-    return float(np.log(value)), scale * by_logarithm
 
 
 def stop_plan(
