@@ -88,6 +88,8 @@ class ModelFit:
         Standard deviation of the sensors' noise in both, shape (2,) [rad].
     misfit
         What the model does not explain; empty if noise explains the residuals.
+    covariance
+        Of the estimates in their order, zero for those that are not told, shape (P, P).
     imbalance
         Of the last link; None where it was not looked for, or nothing tells it.
 
@@ -101,6 +103,7 @@ class ModelFit:
     residual_rms: FloatArray
     noise: FloatArray
     misfit: str
+    covariance: FloatArray
     imbalance: ImbalanceEstimate | None = None
 
     def estimate(self, name: str) -> ParameterEstimate:

@@ -14,63 +14,26 @@
 
 """The front door: the whole model from one recording."""
 
-from dataclasses import replace
 from enum import Enum
-from math import inf, pi, sqrt
+from math import inf
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
-from flat_planner_ros.core.model_fit.imbalance import find_imbalance, turning_of
-from flat_planner_ros.core.model_fit.judgement import covariance, doubt
+from flat_planner_ros.core.model_fit.judgement import doubt
+from flat_planner_ros.core.model_fit.last_fit import fit_last_links, LastFit
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
     COULOMB,
     DAMPING,
-    DELAY,
     LAST,
     NAMES,
-    OFFSET,
     STIFFNESS,
     VISCOUS,
 )
-from flat_planner_ros.core.model_fit.measurements import (
-    encoder_step,
-    Measurements,
-    moves_of,
-    noise_of,
-)
-from flat_planner_ros.core.model_fit.refinement import (
-    first_starts,
-    linearised,
-    Observed,
-    refine,
-    Refined,
-)
-from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
-from flat_planner_ros.core.model_fit.signals import derivatives, segments_of
-from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
+from flat_planner_ros.core.model_fit.measurements import Measurements
+from flat_planner_ros.core.model_fit.observation import names_for, noise_of_links
+from flat_planner_ros.core.model_fit.scales import vector_of
 import numpy as np
-
-SEGMENT = 6.0
-"""Longest segment, in free periods of the passive joint [-]."""
-
-SMOOTHING = 0.15
-"""Span of the polynomials that smooth velocities, in free periods [-]."""
-
-TOLD = 0.3
-"""Largest standard error of a parameter that counts as told, relative to its scale [-]."""
-
-LITTLE = 2.0
-"""Residual relative to the noise with which no other guess is tried [-]."""
-
-COARSE = 0.3
-"""Refinement of the steps for a first fit [-]."""
-
-CLEAR = 9.0
-"""Difference of two sums of squares, in variances, that decides between interpolations [-]."""
-
-UNDECIDED, DECIDED = 0.5, 0.1
-"""Share of the interpolations' difference that stays as a systematic error [-]."""
 
 UNITS = ('kg m^2', 'kg m^2', 'N m/rad', 'N m s/rad', 'N m s/rad', 'N m', 'rad', 's')
 """Units of `last_links.NAMES`."""
@@ -86,9 +49,6 @@ TELLING = (
     'a motion with quick changes of effort',
 )
 """What would tell a parameter, in the order of `last_links.NAMES`."""
-
-GIVEN_UP_FIRST = (DELAY, COULOMB, VISCOUS, OFFSET, LAST, BOTH, DAMPING, STIFFNESS)
-"""Of parameters that only together are told, the one that is kept at its start value."""
 
 
 class Trust(Enum):
@@ -141,148 +101,8 @@ def fit_model(
     """
     if measurements.joints != start.n:
         raise InvalidRequest(f'{measurements.joints} joints measured, the arm has {start.n}')
-    period = 2 * pi / start.natural_mode().frequency
-    observed = observed_of(measurements, period)
-    believed = vector_of(start)
-    noise = np.maximum(_noise(measurements), 1e-9)
-    found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
-    found, observed, other = _interpolated(observed, found, scales)
-    found, free = _told(observed, found, scales, believed)
-    imbalance = None
-    if with_imbalance:
-        former = observed
-        imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
-        other = (other[0] if observed is former else former, other[1])
-    errors = _errors(observed, other, found, free, scales)
-    result = _result(measurements, start, observed, found, free, errors, trust)
-    return replace(result, imbalance=imbalance)
-
-
-def observed_of(measurements: Measurements, period: float) -> Observed:
-    """Return the last two links in absolute angles."""
-    times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
-    span = max(SMOOTHING * period, 6 * measurements.period)
-    _, rates, accelerations = derivatives(times, angles, span)
-    base = rates[:, -3] if measurements.joints > 2 else np.zeros(times.size)
-    segments = segments_of(times, measurements.period, SEGMENT * period)
-    if not segments:
-        raise InvalidRequest('the measurements have no stretch without gaps')
-    shown = np.column_stack((angles[:, -2], measurements.positions[:, -1]))
-    each = np.array([encoder_step(column) for column in measurements.positions.T])
-    steps = np.array([np.linalg.norm(each[:-1]), each[-1]])
-    return Observed(
-        times=times,
-        angles=shown,
-        rates=np.column_stack((rates[:, -2], rates[:, -1] - rates[:, -2])),
-        effort=measurements.efforts[:, -1],
-        base=base,
-        moves=np.column_stack([moves_of(*pair) for pair in zip(shown.T, steps, strict=True)]),
-        rounding=steps / sqrt(12.0),
-        segments=segments,
-        turning=turning_of(measurements.positions[:, -1], rates[:, -2:], accelerations[:, -2:]),
-    )
-
-
-def _noise(measurements: Measurements) -> FloatArray:
-    """Return the noise of link n-1 and of the passive joint, shape (2,) [rad]."""
-    each = noise_of(measurements)
-    return np.array([np.linalg.norm(each[:-1]), each[-1]])
-
-
-def _guesses(
-    measurements: Measurements, observed: Observed, period: float, believed: FloatArray
-) -> list[FloatArray]:
-    """Return weak form and belief, the better one first."""
-    count = round(float(np.ptp(observed.times)) / measurements.period) + 1
-    grid = np.linspace(observed.times[0], observed.times[-1], count)
-    link, passive, rate, effort = (
-        np.interp(grid, observed.times, signal)
-        for signal in (*observed.angles.T, observed.rates[:, 0] - observed.base, observed.effort)
-    )
-    weak = weak_guess(LinkSignals(grid, link, passive, rate, effort), period)
-    guesses = [point for point in (weak, believed) if np.isfinite(point).all()]
-    scales, starts, ones = np.abs(believed) + 1e-9, first_starts(observed), np.ones(2)
-    costs = [linearised(observed, p, starts, (), scales, ones).cost for p in guesses]
-    return [guesses[i] for i in np.argsort(costs)]
-
-
-def _first(
-    observed: Observed, guesses: list[FloatArray], noise: FloatArray
-) -> tuple[Refined, FloatArray]:
-    """Return the fit from the first guess that leaves little, else the best; and the scales."""
-    best, best_scales = None, np.empty(0)
-    coarse = replace(observed, refinement=COARSE)
-    for guess in guesses:
-        scales = scales_of(observed, guess)
-        found = refine(coarse, guess, range(len(NAMES)), scales, noise)
-        if best is None or found.around.cost < best.around.cost:
-            best, best_scales = found, scales
-        if (best.spread < LITTLE * noise).all():
-            break
-    if best is None:
-        raise InvalidRequest('no guess at the model has a meaning')
-    return best, best_scales
-
-
-def _interpolated(
-    observed: Observed, first: Refined, scales: FloatArray
-) -> tuple[Refined, Observed, tuple[Observed, float]]:
-    """Return the fit with the better interpolation of the effort, that, and the other's share."""
-    every = range(len(NAMES))
-    for _ in range(2):  # the second time with the spread that is left, for both alike
-        first = refine(observed, first.parameters, every, scales, first.spread, first.starts)
-    straight = replace(observed, is_linear=True)
-    second = refine(straight, first.parameters, every, scales, first.spread, first.starts)
-    worse = second.around.cost - first.around.cost
-    share = DECIDED if abs(worse) > CLEAR else UNDECIDED
-    if worse > 0.0:
-        return first, observed, (straight, share)
-    return second, straight, (observed, share)
-
-
-def _told(
-    observed: Observed, found: Refined, scales: FloatArray, believed: FloatArray
-) -> tuple[Refined, list[int]]:
-    """Return the fit of what the motion tells, the rest put back to where it was."""
-    free = list(range(len(NAMES)))
-    while True:
-        found = refine(observed, found.parameters, free, scales, found.spread, found.starts)
-        ratio = np.sqrt(np.diag(covariance(found.around, scales[free])))
-        if not free or ratio.max() <= TOLD:
-            return found, free
-        # Parameters that only together are told have errors of one size.
-        vague = [free[i] for i in np.flatnonzero(ratio > max(TOLD, 0.01 * ratio.max()))]
-        given_up = next(index for index in GIVEN_UP_FIRST if index in vague)
-        free.remove(given_up)
-        parameters = found.parameters.copy()
-        parameters[given_up] = believed[given_up]
-        if not parameters[BOTH] > parameters[LAST]:
-            parameters[[BOTH, LAST]] = believed[[BOTH, LAST]]
-        found = refine(observed, parameters, free, scales, found.spread, found.starts)
-
-
-def _errors(
-    observed: Observed,
-    other: tuple[Observed, float],
-    found: Refined,
-    free: list[int],
-    scales: FloatArray,
-) -> FloatArray:
-    """Return the covariance (8, 8) of the parameters: noise, interpolation and integration."""
-    size = np.outer(scales[free], scales[free])
-    inside = covariance(found.around, scales[free]) * size
-    alternative, share = other
-    # The integration is of second order: twice the step adds three times the error.
-    halved = replace(observed, refinement=observed.refinement / 2)
-    for weight, changed in ((share, alternative), (1 / 3, halved)):
-        there = linearised(changed, found.parameters, found.starts, free, scales, found.spread)
-        normal = there.normal.sum(axis=0) * size + np.eye(len(free)) * 1e-12
-        change = there.gradient - found.around.gradient
-        moved = weight * scales[free] * np.linalg.solve(normal, scales[free] * change)
-        inside += np.outer(moved, moved)
-    whole = np.zeros((len(NAMES), len(NAMES)))
-    whole[np.ix_(free, free)] = inside
-    return whole
+    last = fit_last_links(measurements, start, with_imbalance=with_imbalance)
+    return _result(measurements, start, last, trust)
 
 
 def _scaled_to_inertia(
@@ -300,13 +120,11 @@ def _scaled_to_inertia(
 def _result(
     measurements: Measurements,
     start: PlanarArm,
-    observed: Observed,
-    found: Refined,
-    free: list[int],
-    errors: FloatArray,
+    last: LastFit,
     trust: Trust,
 ) -> ModelFit:
     """Put numbers into words."""
+    observed, found, free, errors, imbalance = last
     believed, values = vector_of(start), found.parameters[: len(NAMES)]
     scale = 1.0
     if trust is Trust.INERTIA and BOTH in free:
@@ -315,7 +133,7 @@ def _result(
     residuals = np.full(observed.angles.shape, np.nan)
     for segment, part in zip(observed.segments, found.around.residuals, strict=True):
         residuals[segment.first : segment.last] = part
-    noise = _noise(measurements)
+    noise = noise_of_links(measurements)
     return ModelFit(
         arm=_arm(start, values),
         estimates=_estimates(start, values, errors, free),
@@ -325,6 +143,8 @@ def _result(
         residual_rms=found.spread,
         noise=noise,
         misfit=doubt(found.around, found.spread, noise, observed.angles.std(axis=0)),
+        imbalance=imbalance,
+        covariance=errors,
     )
 
 
@@ -333,9 +153,7 @@ def _estimates(
 ) -> tuple[ParameterEstimate, ...]:
     """Return the estimates of the last two links."""
     believed, stds = vector_of(start), np.sqrt(np.diag(errors))
-    names = list(NAMES)
-    for index in (VISCOUS, COULOMB):
-        names[index] += f'[{start.n - 1}]'
+    names = names_for(start.n)
     return tuple(
         ParameterEstimate(
             name=name,

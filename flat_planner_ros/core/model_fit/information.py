@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from math import pi
 
 from flat_planner_ros.core.arm import FloatArray, PlanarArm
-from flat_planner_ros.core.model_fit.fit import observed_of, SEGMENT
 from flat_planner_ros.core.model_fit.last_links import (
     COULOMB,
     Forcing,
@@ -28,6 +27,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     trajectories,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
+from flat_planner_ros.core.model_fit.observation import observed_of, SEGMENT
 from flat_planner_ros.core.model_fit.refinement import CHANNELS, first_starts, linearised, Observed
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
 from flat_planner_ros.core.model_fit.signals import segments_of

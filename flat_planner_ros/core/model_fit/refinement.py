@@ -308,6 +308,12 @@ def _is_small(step: FloatArray, around: Linearisation, scales: FloatArray) -> bo
     return in_errors < CONVERGED**2 or float(np.abs(step / scales).max()) < SMALLEST
 
 
+def blocks(segments: Sequence[Segment]) -> Iterator[tuple[int, Sequence[Segment]]]:
+    """Yield segments that are simulated side by side, each time with the index of the first."""
+    for first in range(0, len(segments), BLOCK):
+        yield first, segments[first : first + BLOCK]
+
+
 def _segments(
     observed: Observed,
     parameters: FloatArray,
@@ -319,11 +325,10 @@ def _segments(
     nudges = DIFFERENCE * scales[list(free)]
     models = np.tile(parameters, (1 + STATES + len(free), 1))
     models[1 + STATES + np.arange(len(free)), list(free)] += nudges
-    for first in range(0, len(observed.segments), BLOCK):
-        block = observed.segments[first : first + BLOCK]
+    for first, block in blocks(observed.segments):
         begun = np.tile(starts[first : first + BLOCK].T, (len(models), 1, 1))
         begun[1 : 1 + STATES] += DIFFERENCE * np.eye(STATES)[:, :, None]
-        seen = _seen(observed, block, models, begun)
+        seen = seen_of(observed, block, models, begun)
         for segment, angles in zip(block, seen, strict=True):
             middle = angles[:, :1]
             slopes = (angles[:, 1:] - middle).transpose(0, 2, 1)
@@ -333,7 +338,7 @@ def _segments(
             yield middle[:, 0] - measured, by_start, by_parameter
 
 
-def _seen(
+def seen_of(
     observed: Observed, block: Sequence[Segment], models: FloatArray, starts: FloatArray
 ) -> list[FloatArray]:
     """Return for each segment what the sensors would show of every model, (m, models, 2) [rad]."""

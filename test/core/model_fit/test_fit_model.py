@@ -69,6 +69,17 @@ def test_four_goals_tell_all_six(rate, noise, bits, bound):
     assert fit.misfit == ''
 
 
+def test_a_start_that_friction_hides_leads_nowhere_wrong():
+    """The noise of this seed says 0.2 rad/s for a joint at rest, which stops within a sample."""
+    friction = {'viscous': 2e-4, 'coulomb': 5e-4}
+    arm = BELIEVED.with_last_links(
+        inertia_star=BELIEVED.inertia_star, stiffness=3e-3, damping=2e-5, **friction
+    )
+    fit = fit_model(recorded(arm, arm, noise=1e-3, seed=8, **SHORT), arm)
+    assert np.abs(z_scores(fit, arm)).max() < 4.0
+    assert fit.misfit == ''
+
+
 def test_a_delay_and_an_offset_are_found():
     late, bent = 0.012, 0.03
     seen = recorded(TRUE, BELIEVED, noise=1e-4)

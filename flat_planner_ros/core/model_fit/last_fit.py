@@ -1,0 +1,209 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The fit of the last two links: a guess, its refinement, what is told, and how well."""
+
+from dataclasses import replace
+from math import pi
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.model_fit.imbalance import find_imbalance, ImbalanceEstimate
+from flat_planner_ros.core.model_fit.judgement import covariance
+from flat_planner_ros.core.model_fit.last_links import (
+    BOTH,
+    COULOMB,
+    DAMPING,
+    DELAY,
+    LAST,
+    NAMES,
+    OFFSET,
+    STIFFNESS,
+    VISCOUS,
+)
+from flat_planner_ros.core.model_fit.measurements import Measurements
+from flat_planner_ros.core.model_fit.observation import noise_of_links, observed_of
+from flat_planner_ros.core.model_fit.refinement import (
+    first_starts,
+    linearised,
+    Observed,
+    refine,
+    Refined,
+)
+from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
+from flat_planner_ros.core.model_fit.starts import settled
+from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
+import numpy as np
+
+TOLD = 0.3
+"""Largest standard error of a parameter that counts as told, relative to its scale [-]."""
+
+LITTLE = 2.0
+"""Residual relative to the noise with which no other guess is tried [-]."""
+
+COARSE = 0.3
+"""Refinement of the steps for a first fit [-]."""
+
+CLEAR = 9.0
+"""Difference of two sums of squares, in variances, that decides between interpolations [-]."""
+
+UNDECIDED, DECIDED = 0.5, 0.1
+"""Share of the interpolations' difference that stays as a systematic error [-]."""
+
+GIVEN_UP_FIRST = (DELAY, COULOMB, VISCOUS, OFFSET, LAST, BOTH, DAMPING, STIFFNESS)
+"""Of parameters that only together are told, the one that is kept at its start value."""
+
+
+class LastFit(NamedTuple):
+    """
+    The last two links as fitted.
+
+    Attributes
+    ----------
+    observed
+        The recording, with the interpolation of the effort that explains it best.
+    found
+        Parameters in the order of `last_links.NAMES`, and what is left.
+    free
+        Which of them the motion tells.
+    errors
+        Covariance of all, zero for those that are not told, shape (8, 8).
+    imbalance
+        Of the last link; None where it was not looked for, or nothing tells it.
+
+    """
+
+    observed: Observed
+    found: Refined
+    free: list[int]
+    errors: FloatArray
+    imbalance: ImbalanceEstimate | None
+
+
+def fit_last_links(
+    measurements: Measurements, start: PlanarArm, *, with_imbalance: bool
+) -> LastFit:
+    """Fit the last two links; parameters and errors as for `fit_model`."""
+    period = 2 * pi / start.natural_mode().frequency
+    observed = observed_of(measurements, period)
+    believed = vector_of(start)
+    noise = np.maximum(noise_of_links(measurements), 1e-9)
+    found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
+    found, observed, other = _interpolated(observed, found, scales)
+    found, free = _told(observed, found, scales, believed)
+    imbalance = None
+    if with_imbalance:
+        former = observed
+        imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
+        other = (other[0] if observed is former else former, other[1])
+    return LastFit(observed, found, free, _errors(observed, other, found, free, scales), imbalance)
+
+
+def _guesses(
+    measurements: Measurements, observed: Observed, period: float, believed: FloatArray
+) -> list[FloatArray]:
+    """Return weak form and belief, the better one first."""
+    count = round(float(np.ptp(observed.times)) / measurements.period) + 1
+    grid = np.linspace(observed.times[0], observed.times[-1], count)
+    link, passive, rate, effort = (
+        np.interp(grid, observed.times, signal)
+        for signal in (*observed.angles.T, observed.rates[:, 0] - observed.base, observed.effort)
+    )
+    weak = weak_guess(LinkSignals(grid, link, passive, rate, effort), period)
+    guesses = [point for point in (weak, believed) if np.isfinite(point).all()]
+    scales, starts, ones = np.abs(believed) + 1e-9, first_starts(observed), np.ones(2)
+    costs = [linearised(observed, p, starts, (), scales, ones).cost for p in guesses]
+    return [guesses[i] for i in np.argsort(costs)]
+
+
+def _first(
+    observed: Observed, guesses: list[FloatArray], noise: FloatArray
+) -> tuple[Refined, FloatArray]:
+    """Return the fit from the first guess that leaves little, else the best; and the scales."""
+    best, best_scales = None, np.empty(0)
+    coarse = replace(observed, refinement=COARSE)
+    for guess in guesses:
+        scales = scales_of(observed, guess)
+        starts = settled(coarse, guess, noise)
+        found = refine(coarse, guess, range(len(NAMES)), scales, noise, starts)
+        starts = settled(coarse, found.parameters, found.spread, found.starts)
+        found = refine(coarse, found.parameters, range(len(NAMES)), scales, noise, starts)
+        if best is None or found.around.cost < best.around.cost:
+            best, best_scales = found, scales
+        if (best.spread < LITTLE * noise).all():
+            break
+    if best is None:
+        raise InvalidRequest('no guess at the model has a meaning')
+    return best, best_scales
+
+
+def _interpolated(
+    observed: Observed, first: Refined, scales: FloatArray
+) -> tuple[Refined, Observed, tuple[Observed, float]]:
+    """Return the fit with the better interpolation of the effort, that, and the other's share."""
+    every = range(len(NAMES))
+    for _ in range(2):  # the second time with the spread that is left, for both alike
+        first = refine(observed, first.parameters, every, scales, first.spread, first.starts)
+    straight = replace(observed, is_linear=True)
+    second = refine(straight, first.parameters, every, scales, first.spread, first.starts)
+    worse = second.around.cost - first.around.cost
+    share = DECIDED if abs(worse) > CLEAR else UNDECIDED
+    if worse > 0.0:
+        return first, observed, (straight, share)
+    return second, straight, (observed, share)
+
+
+def _told(
+    observed: Observed, found: Refined, scales: FloatArray, believed: FloatArray
+) -> tuple[Refined, list[int]]:
+    """Return the fit of what the motion tells, the rest put back to where it was."""
+    free = list(range(len(NAMES)))
+    while True:
+        found = refine(observed, found.parameters, free, scales, found.spread, found.starts)
+        ratio = np.sqrt(np.diag(covariance(found.around, scales[free])))
+        if not free or ratio.max() <= TOLD:
+            return found, free
+        # Parameters that only together are told have errors of one size.
+        vague = [free[i] for i in np.flatnonzero(ratio > max(TOLD, 0.01 * ratio.max()))]
+        given_up = next(index for index in GIVEN_UP_FIRST if index in vague)
+        free.remove(given_up)
+        parameters = found.parameters.copy()
+        parameters[given_up] = believed[given_up]
+        if not parameters[BOTH] > parameters[LAST]:
+            parameters[[BOTH, LAST]] = believed[[BOTH, LAST]]
+        found = refine(observed, parameters, free, scales, found.spread, found.starts)
+
+
+def _errors(
+    observed: Observed,
+    other: tuple[Observed, float],
+    found: Refined,
+    free: list[int],
+    scales: FloatArray,
+) -> FloatArray:
+    """Return the covariance (8, 8) of the parameters: noise, interpolation and integration."""
+    size = np.outer(scales[free], scales[free])
+    inside = covariance(found.around, scales[free]) * size
+    alternative, share = other
+    # The integration is of second order: twice the step adds three times the error.
+    halved = replace(observed, refinement=observed.refinement / 2)
+    for weight, changed in ((share, alternative), (1 / 3, halved)):
+        there = linearised(changed, found.parameters, found.starts, free, scales, found.spread)
+        normal = there.normal.sum(axis=0) * size + np.eye(len(free)) * 1e-12
+        change = there.gradient - found.around.gradient
+        moved = weight * scales[free] * np.linalg.solve(normal, scales[free] * change)
+        inside += np.outer(moved, moved)
+    whole = np.zeros((len(NAMES), len(NAMES)))
+    whole[np.ix_(free, free)] = inside
+    return whole

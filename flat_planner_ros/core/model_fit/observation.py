@@ -1,0 +1,79 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A recording of the last two links as the fit sees it, and the size of what it looks for."""
+
+from math import sqrt
+
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.core.model_fit.imbalance import turning_of
+from flat_planner_ros.core.model_fit.last_links import (
+    COULOMB,
+    NAMES,
+    VISCOUS,
+)
+from flat_planner_ros.core.model_fit.measurements import (
+    encoder_step,
+    Measurements,
+    moves_of,
+    noise_of,
+)
+from flat_planner_ros.core.model_fit.refinement import Observed
+from flat_planner_ros.core.model_fit.signals import derivatives, segments_of
+import numpy as np
+
+SEGMENT = 6.0
+"""Longest segment, in free periods of the passive joint [-]."""
+
+SMOOTHING = 0.15
+"""Span of the polynomials that smooth velocities, in free periods [-]."""
+
+
+def observed_of(measurements: Measurements, period: float) -> Observed:
+    """Return the last two links in absolute angles."""
+    times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
+    span = max(SMOOTHING * period, 6 * measurements.period)
+    _, rates, accelerations = derivatives(times, angles, span)
+    base = rates[:, -3] if measurements.joints > 2 else np.zeros(times.size)
+    segments = segments_of(times, measurements.period, SEGMENT * period)
+    if not segments:
+        raise InvalidRequest('the measurements have no stretch without gaps')
+    shown = np.column_stack((angles[:, -2], measurements.positions[:, -1]))
+    each = np.array([encoder_step(column) for column in measurements.positions.T])
+    steps = np.array([np.linalg.norm(each[:-1]), each[-1]])
+    return Observed(
+        times=times,
+        angles=shown,
+        rates=np.column_stack((rates[:, -2], rates[:, -1] - rates[:, -2])),
+        effort=measurements.efforts[:, -1],
+        base=base,
+        moves=np.column_stack([moves_of(*pair) for pair in zip(shown.T, steps, strict=True)]),
+        rounding=steps / sqrt(12.0),
+        segments=segments,
+        turning=turning_of(measurements.positions[:, -1], rates[:, -2:], accelerations[:, -2:]),
+    )
+
+
+def noise_of_links(measurements: Measurements) -> FloatArray:
+    """Return the noise of link n-1 and of the passive joint, shape (2,) [rad]."""
+    each = noise_of(measurements)
+    return np.array([np.linalg.norm(each[:-1]), each[-1]])
+
+
+def names_for(joints: int) -> list[str]:
+    """Return the names of the last links' parameters, with the joint where it is friction's."""
+    names = list(NAMES)
+    for index in (VISCOUS, COULOMB):
+        names[index] += f'[{joints - 1}]'
+    return names
