@@ -16,11 +16,13 @@
 
 from argparse import Namespace
 from collections.abc import Callable
+from functools import cache
 from math import pi
 from time import perf_counter
 from typing import Any
 
 from flat_planner_ros.core import Goal, GoalPoint, plan
+from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.session import Motion, Timeline
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
@@ -202,16 +204,22 @@ def _path_section() -> Section:
     )
 
 
+@cache
+def _arm() -> PlanarArm:
+    """Return the arm, the same one in each plan, as a node has it."""
+    return problem.arm()
+
+
 def _motion(points: int) -> Motion:
     """Return what the session makes of the paper's goal."""
-    made = plan(problem.request(), problem.arm(), problem.OPTIONS)
+    made = plan(problem.request(), _arm(), problem.OPTIONS)
     samples = made.sample(problem.DURATION / (points - 1))
     return Motion(plan_id=1, plan=made, samples=samples, start=1e9 + 0.5, planned_at=1e9)
 
 
 def _parts_section() -> Section:
     """Measure the steps of the callback one by one."""
-    arm, request = problem.arm(), problem.request()
+    arm, request = _arm(), problem.request()
     period = problem.DURATION / (WATCHED - 1)
     motion, data = _motion(WATCHED), serialize_message(_goal(pi))
     timeline = Timeline([motion])

@@ -29,6 +29,7 @@ BENCHMARKS = (
     'planning',
     'scaling',
     'node_path',
+    'goal_stream',
     'plant',
     'monitor',
     'start_up',
@@ -42,7 +43,7 @@ BENCHMARKS = (
 )
 """Modules with a function `sections`, in this order."""
 
-WITH_ROS = ('node_path', 'plant', 'monitor', 'start_up')
+WITH_ROS = ('node_path', 'goal_stream', 'plant', 'monitor', 'start_up')
 """Those that need ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'

@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 from math import inf, sqrt
 from typing import NamedTuple
 
@@ -324,7 +325,7 @@ class PlanarArm(ArmDynamics):
             coulomb_friction=frictions[1],
         )
 
-    @property
+    @cached_property
     def inertia_star(self) -> InertiaStar:
         """Return I*_{n-1} and I*_n [kg m^2]; raise NotFlat if the arm has no such constants."""
         self.check_flat()

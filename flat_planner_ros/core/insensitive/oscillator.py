@@ -22,6 +22,7 @@ whose boundary holds the worst arm ((I1) and I.1 of docs/derivation.md).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import accumulate
 from math import ceil
 
 from flat_planner_ros.core.arm import (
@@ -199,17 +200,25 @@ class Oscillator:
         ends = corners[following]
         poles = self.poles(corners)
         turns = duration * np.abs(poles[following] - poles)
-        edges = []
-        for begin, end, turn in zip(corners, ends, turns.tolist(), strict=True):
-            if (begin == end).all():
-                continue
-            count = min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most)
-            share = _spread(count)
-            edge = begin + share[:, None] * (end - begin)
-            # Frequencies go with the root of 1 / inertia, over which points are spread evenly.
-            edge[:, 2] = 1.0 / (1.0 / begin[2] + share * (1.0 / end[2] - 1.0 / begin[2]))
-            edges.append(edge)
-        return edges or [corners[:1]]
+        counts = [
+            min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most) if is_long else 0
+            for turn, is_long in zip(turns.tolist(), (corners != ends).any(axis=1), strict=True)
+        ]
+        if not any(counts):
+            return [corners[:1]]
+        # All edges at once, as they have few points each.
+        share = np.concatenate([_spread(count) for count in counts])
+        begin, end = np.repeat(corners, counts, axis=0), np.repeat(ends, counts, axis=0)
+        factors = begin + share[:, None] * (end - begin)
+        # Frequencies go with the root of 1 / inertia, over which points are spread evenly.
+        begin, end = 1.0 / begin[:, 2], 1.0 / end[:, 2]
+        factors[:, 2] = 1.0 / (begin + share * (end - begin))
+        lasts = accumulate(counts)
+        return [
+            factors[last - count : last]
+            for last, count in zip(lasts, counts, strict=True)
+            if count
+        ]
 
     def nodes(self, box: UncertaintyBox, duration: float) -> tuple[FloatArray, FloatArray]:
         """Return points inside a box, shape (p, 3), and weights of a mean over it, shape (p,)."""
@@ -235,27 +244,29 @@ class Oscillator:
 def largest(edges: Sequence[FloatArray], values: FloatArray) -> tuple[float, FloatArray]:
     """Return the largest of the values along all edges, and its factors, shape (3,)."""
     worst, place, first = -1.0, edges[0][0], 0
+    listed = values.tolist()
     for edge in edges:
-        value, at = _peak(edge, values[first : first + len(edge)])
+        value, at = _peak(edge, listed[first : first + len(edge)])
         first += len(edge)
         if value > worst:
             worst, place = value, at
     return worst, place
 
 
-def _peak(edge: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
+def _peak(edge: FloatArray, values: list[float]) -> tuple[float, FloatArray]:
     """Return the largest value along an edge, from a parabola through its neighbours."""
-    i = int(np.argmax(values))
-    if not 0 < i < len(values) - 1:
-        return float(values[i]), edge[i]
+    last, peak = len(values) - 1, max(values)
+    i = values.index(peak)
+    if not 0 < i < last:
+        return peak, edge[i]
     span = edge[i + 1] - edge[i - 1]
     share = float(np.abs(edge[i] - edge[i - 1]).sum() / np.abs(span).sum())
-    a, b, c = values[i - 1 : i + 2].tolist()
+    a, b, c = values[i - 1 : i + 2]
     # Newton's form a + s u + q u (u - share) over u in [0, 1].
     slope = (b - a) / share
     bend = (c - a - slope) / (1.0 - share)
     if bend >= 0.0:
-        return float(b), edge[i]
+        return b, edge[i]
     at = min(max(0.5 * (share - slope / bend), 0.0), 1.0)
     top = a + slope * at + bend * at * (at - share)
-    return max(float(b), float(top)), edge[i - 1] + at * span
+    return max(b, top), edge[i - 1] + at * span

@@ -21,14 +21,23 @@ inertia of the last link. Its largest value over a box lies on the boundary of t
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
-from flat_planner_ros.core.arm import ComplexArray, Drive, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import ComplexArray, Drive, FloatArray, locked, PlanarArm
 from flat_planner_ros.core.insensitive.insensitivity import UncertaintyBox
 from flat_planner_ros.core.insensitive.oscillator import largest, Oscillator
 import numpy as np
 
 BLOCK = 32
 """Effort samples per row of the table of exponentials."""
+
+MAPS_KEPT = 8
+"""
+Residuals as maps of signals that are remembered, for motions of one duration or a few in turn.
+
+One takes 40 kilobytes for each hundred arms and up to 1024 samples.
+"""
 
 GREGORY = (3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0)
 """
@@ -106,41 +115,96 @@ def residual_amplitude(
     by the trapezoidal rule, which converges fast for motions that begin and end smoothly.
 
     """
-    step = duration / (len(signal) - 1)
-    rows = -(-len(signal) // BLOCK)
-    padded = np.zeros(rows * BLOCK)
-    padded[: len(signal)] = signal[::-1]
-    turn = step * poles
-    fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
-    coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
-    total = np.einsum('rp,rp->p', padded.reshape(rows, BLOCK) @ fine, coarse)
-    inner, first = _weights(oscillator, poles, step)
-    driven = -inner * total
-    angle, velocity = start
-    if angle or velocity or signal[0]:
-        # In motion: the first samples weigh less, and the joint brings its own oscillation.
-        free = velocity - poles.conj() * angle
-        driven += np.exp(duration * poles) * free
-        for index, weight in enumerate(first):
-            left = np.exp((duration - index * step) * poles)
-            driven += (inner - weight) * signal[index] * left
-    amplitudes: FloatArray = np.abs(driven) / poles.imag
-    return amplitudes
+    return _ResidualMap.of(oscillator, poles, duration, len(signal)).amplitudes(signal, start)
+
+
+class _ResidualMap(NamedTuple):
+    """
+    What signals of one length leave on some arms, as a linear map.
+
+    Attributes
+    ----------
+    duration, step
+        From the first sample to the last, and to the next [s].
+    poles
+        Of the arms, shape (p,) [1/s].
+    fine, coarse
+        Exponentials over the samples of a block, shape (BLOCK, p), and over the blocks, (rows, p).
+    inner, first
+        Weights of a sample between others, and of the first ones of a start in motion, shape (p,).
+
+    """
+
+    duration: float
+    step: float
+    poles: ComplexArray
+    fine: ComplexArray
+    coarse: ComplexArray
+    inner: ComplexArray
+    first: tuple[ComplexArray, ...]
+
+    @classmethod
+    def of(
+        cls, oscillator: Oscillator, poles: ComplexArray, duration: float, samples: int
+    ) -> '_ResidualMap':
+        """Return the map of signals of some samples over a duration [s]."""
+        step = duration / (samples - 1)
+        turn = step * poles
+        rows = -(-samples // BLOCK)
+        fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
+        coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
+        inner, first = _weights(oscillator, turn, step)
+        return cls(duration, step, poles, fine, coarse, inner, first)
+
+    def amplitudes(self, signal: FloatArray, start: tuple[float, float]) -> FloatArray:
+        """Return amplitudes, shape (p,) [rad]; arguments as of `residual_amplitude`."""
+        blocks = np.zeros((len(self.coarse), BLOCK))
+        blocks.ravel()[: len(signal)] = signal[::-1]
+        driven = np.einsum('rp,rp->p', blocks @ self.fine, self.coarse) * -self.inner
+        angle, velocity = start
+        if angle or velocity or signal[0]:
+            # In motion: the first samples weigh less, and the joint brings its own oscillation.
+            poles, step = self.poles, self.step
+            free = velocity - poles.conj() * angle
+            driven += np.exp(self.duration * poles) * free
+            for index, weight in enumerate(self.first):
+                left = np.exp((self.duration - index * step) * poles)
+                driven += (self.inner - weight) * signal[index] * left
+        amplitudes: FloatArray = np.abs(driven) / self.poles.imag
+        return amplitudes
+
+
+class _Surroundings(NamedTuple):
+    """The arms on the edges of a box, factors (m, 3) each, and the map to what they are left."""
+
+    edges: tuple[FloatArray, ...]
+    residuals: _ResidualMap
+
+
+@lru_cache(maxsize=MAPS_KEPT)
+def _surroundings(
+    oscillator: Oscillator, box: UncertaintyBox, duration: float, samples: int
+) -> _Surroundings:
+    """Return the edges of a box, and what the nominal arm and those on them are left."""
+    edges = oscillator.edges(box, duration)
+    poles = oscillator.poles(np.concatenate([np.ones((1, 3)), *edges]))
+    return _Surroundings(
+        tuple(locked(edge) for edge in edges),
+        _ResidualMap.of(oscillator, poles, duration, samples),
+    )
 
 
 def _weights(
-    oscillator: Oscillator, poles: ComplexArray, step: float
-) -> tuple[ComplexArray, list[ComplexArray]]:
+    oscillator: Oscillator, turn: ComplexArray, step: float
+) -> tuple[ComplexArray, tuple[ComplexArray, ...]]:
     """Return weights of a sample between others, and of the first ones of a start in motion."""
-    turn = step * poles
     if oscillator.drive is Drive.POSITION:
         # By parts: the velocity is smoother than the acceleration, whose rise may be abrupt.
-        first = [weight * turn for weight in GREGORY]
-        first[0] = first[0] - 1.0
-        return turn, first
+        first, *others = [weight * turn for weight in GREGORY]
+        return turn, (first - 1.0, *others)
     hat, half_hat = (np.sinh(0.5 * turn) / (0.5 * turn)) ** 2, (np.expm1(-turn) + turn) / turn**2
     scale = step * oscillator.gain
-    return scale * hat, [scale * half_hat]
+    return scale * hat, (scale * half_hat,)
 
 
 def servo_effort(arm: PlanarArm, velocity: FloatArray, duration: float) -> FloatArray:
@@ -262,10 +326,8 @@ def predict_residual(
 
     """
     oscillator = Oscillator.of(arm, drive)
-    edges = oscillator.edges(box, duration)
-    factors = np.concatenate([np.ones((1, 3)), *edges])
-    poles = oscillator.poles(factors)
-    amplitudes = residual_amplitude(oscillator, signal, duration, poles, start or (0.0, 0.0))
+    edges, residuals = _surroundings(oscillator, box, float(duration), len(signal))
+    amplitudes = residuals.amplitudes(signal, start or (0.0, 0.0))
     worst, place = largest(edges, amplitudes[1:])
     miss = 0.0
     if drive is Drive.EFFORT:

@@ -237,9 +237,12 @@ class Plan:
             From the start of the motion, clipped to it, shape (m,) [s].
 
         """
-        planned = self.trajectory.jets(times)
+        return self._samples(np.array(times), self.trajectory.jets(times))
+
+    def _samples(self, times: FloatArray, planned: FloatArray) -> PlanSamples:
+        """Return the plan at times (m,) [s] at which derivatives are known, (n - 1, 7, m)."""
         return PlanSamples(
-            times=np.array(times),
+            times=times,
             planned=planned,
             driving_effort=apply_row(self.problem.flat_map.effort, planned[0]),
             problem=self.problem,
@@ -283,10 +286,10 @@ class Plan:
                 np.append(mean.peak[0], 0.0),
                 mean.peak[1:],
             )
-        times, weights = trajectory.quadrature()
-        samples = self.at(times)
+        nodes = trajectory.nodes
+        samples = self._samples(nodes.times, nodes.planned)
         return _Figures(
-            np.sqrt(weights @ samples.efforts**2),
+            np.sqrt(nodes.weights @ samples.efforts**2),
             np.abs(samples.efforts).max(axis=0),
             np.abs(samples.velocities).max(axis=0),
         )

@@ -153,6 +153,8 @@ class JointLimits:
 
         """
         low, high = self.position_min, self.position_max
+        if ((low <= positions) & (positions <= high)).all():
+            return self
         near_low, near_high = positions >= low - tolerance, positions <= high + tolerance
         return replace(
             self,

@@ -22,7 +22,7 @@ law.
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from flat_planner_ros.core.arm import (
     apply_row,
@@ -220,8 +220,27 @@ class ReferenceTrajectory(Protocol):
     def on_even_grid(self, intervals: int) -> tuple[FloatArray, FloatArray]:
         """Return derivatives 0 to 6, (n - 1, 7, m), and driving effort, (m,), at even times."""
 
-    def quadrature(self) -> tuple[FloatArray, FloatArray]:
-        """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
+    @property
+    def nodes(self) -> 'MotionNodes':
+        """Return the motion at the nodes of a quadrature that resolves it."""
+
+
+class MotionNodes(NamedTuple):
+    """
+    A motion at the nodes of a quadrature.
+
+    Attributes
+    ----------
+    times, weights
+        Of the nodes, from the start [s], and for means over the motion, of sum 1 [-]; shape (m,).
+    planned
+        Derivatives 0 to 6 there, shape (n - 1, 7, m).
+
+    """
+
+    times: FloatArray
+    weights: FloatArray
+    planned: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -302,10 +321,12 @@ class RestToRestTrajectory:
             values[0], values[-1] = start, final
         return table[:, :-1], table[0, -1]
 
-    def quadrature(self) -> tuple[FloatArray, FloatArray]:
-        """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
+    @cached_property
+    def nodes(self) -> MotionNodes:
+        """Return the motion at the nodes of a quadrature that resolves it."""
         travel = sum(abs(distance) for distance in self.distances)
-        return motion_quadrature(self.problem.unit.law.rates, travel, self.edges)
+        times, weights = motion_quadrature(self.problem.unit.law.rates, travel, self.edges)
+        return MotionNodes(times, weights, self.jets(times))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -350,10 +371,10 @@ class LawTrajectory:
         """Return the sum of the costs, the integrals of Y^T Q Y, or the laws' own cost."""
         if self.own_cost is not None:
             return self.own_cost
-        times, weights = self.quadrature()
-        derivatives = self.jets(times)[:, 1:]
+        nodes = self.nodes
+        derivatives = nodes.planned[:, 1:]
         density = np.einsum('vim,ij,vjm->m', derivatives, self.problem.cost.matrix, derivatives)
-        return float(self.problem.duration * (weights @ density))
+        return float(self.problem.duration * (nodes.weights @ density))
 
     def jets(self, times: FloatArray) -> FloatArray:
         """Return the derivatives 0 to 6 at times clipped to the motion, shape (n - 1, 7, m)."""
@@ -372,7 +393,13 @@ class LawTrajectory:
         planned = self.jets(even_times(self.problem.duration, intervals))
         return planned, apply_row(self.problem.flat_map.effort, planned[0])
 
-    def quadrature(self) -> tuple[FloatArray, FloatArray]:
+    @cached_property
+    def nodes(self) -> MotionNodes:
+        """Return the motion at the nodes of a quadrature that resolves it."""
+        times, weights = self._quadrature()
+        return MotionNodes(times, weights, self.jets(times))
+
+    def _quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Return times [s] and weights of sum 1 for means over the motion, shape (m,)."""
         knots = self.knots
         if knots is not None:

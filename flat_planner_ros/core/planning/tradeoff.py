@@ -20,6 +20,7 @@ Nothing here is simulated: every residual is an integral over the effort (`insen
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from flat_planner_ros.core.arm import (
     Drive,
@@ -42,7 +43,7 @@ from flat_planner_ros.core.planning.limits import JointLimits
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.planning.shortest_duration import shortest_plan
-from flat_planner_ros.core.planning.strategies import shortest_known
+from flat_planner_ros.core.planning.strategies import OWN_LAWS, shortest_known
 import numpy as np
 
 INTERVALS = 1000
@@ -60,6 +61,9 @@ STRETCHES = (1.05, 1.1, 1.2)
 
 PAYS = 0.5
 """Share of the worst residual, or less, that must be left for a stretch to pay [-]."""
+
+ADVICES_KEPT = 16
+"""Residuals of longer motions over 1 rad that are remembered."""
 
 DURATIONS = (0.01, 600.0)
 """Range in which the shortest duration is looked for [s]."""
@@ -173,23 +177,47 @@ def duration_advice(planned: Plan, residual: PredictedResidual) -> str | None:
     if residual.worst < NOTICEABLE or request.via or request.start_jets is not None:
         return None
     line = None
+    way = float(np.sum(request.final) - np.sum(request.start))
     # The longest first: where that does not pay, nothing does.
     for stretch in sorted(STRETCHES, reverse=True):
         duration = stretch * request.duration
         try:
-            longer = plan(
-                replace(request, duration=duration), planned.problem.arm, planned.options
-            )
+            left = _worst_residual(planned.problem.arm, planned.options, duration, way)
         except FlatPlannerError:
             return line
-        left = residual_of_plan(longer, longer.sample(duration / ADVICE_INTERVALS))
-        if left.worst > PAYS * residual.worst:
+        if left > PAYS * residual.worst:
             return line
         line = (
             f'{100.0 * (stretch - 1.0):.0f} % longer ({duration:.4g} s) cuts the worst residual '
-            f'from {residual.worst:.2g} to {left.worst:.2g} rad'
+            f'from {residual.worst:.2g} to {left:.2g} rad'
         )
     return line
+
+
+def _worst_residual(
+    arm: PlanarArm, options: PlanningOptions, duration: float, way: float
+) -> float:
+    """Return the worst residual of a motion from rest to rest, whose y1 goes a way [rad]."""
+    if options.strategy in OWN_LAWS:
+        return _worst_at_rest(arm, options, duration, way)
+    # In proportion, so that goals of one duration are advised at once.
+    return abs(way) * _worst_of_unit(arm, options, duration)
+
+
+def _worst_at_rest(arm: PlanarArm, options: PlanningOptions, duration: float, way: float) -> float:
+    """Return the same, from a plan of joint n-1 alone."""
+    final = np.zeros(arm.n)
+    final[-2] = way
+    planned = plan(
+        MotionRequest(start=np.zeros(arm.n), final=final, duration=duration), arm, options
+    )
+    return residual_of_plan(planned, planned.sample(duration / ADVICE_INTERVALS)).worst
+
+
+@lru_cache(maxsize=ADVICES_KEPT)
+def _worst_of_unit(arm: PlanarArm, options: PlanningOptions, duration: float) -> float:
+    """Return that of a way of 1 rad; arms and options count as equal if identical."""
+    return _worst_at_rest(arm, options, duration, 1.0)
 
 
 def time_advice(planned: Plan) -> str | None:

@@ -134,13 +134,17 @@ def stopping_plan(settings: SessionSettings, start: MotionStart, running: Motion
 def _model(settings: SessionSettings, start: MotionStart) -> tuple[PlanarArm, PlanningOptions]:
     """Return the model in whose terms a motion is planned, and what is minimised."""
     arm, options = settings.arm, settings.options
+    flat_model = options.flat_model
     if start.swing is not None:  # a measured state is not said in terms of a flat model
-        return arm, replace(options, flat_model=FlatModel.EXACT)
-    if start.jets is None or start.running is None:
-        return arm, options
-    # What the arm is planned to do then is said in terms of the model it was planned with.
-    running = start.running.plan
-    return running.problem.arm, replace(options, flat_model=running.options.flat_model)
+        flat_model = FlatModel.EXACT
+    elif start.jets is not None and start.running is not None:
+        # What the arm is planned to do then is said in terms of the model it was planned with.
+        running = start.running.plan
+        arm, flat_model = running.problem.arm, running.options.flat_model
+    # The very same ones, as far as can be: what is prepared for them serves again.
+    if flat_model is not options.flat_model:
+        options = replace(options, flat_model=flat_model)
+    return arm, options
 
 
 @contextmanager

@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.planning import (
@@ -250,7 +251,7 @@ class SessionSettings:
             Pose that it starts from, shape (n,) [rad].
 
         """
-        limits = self.limits or JointLimits.of(self.arm.n)
+        limits = self.limits or _no_limits(self.arm.n)
         return DurationRules(
             joints=self.joints,
             limits=limits.reaching(start, self.position_tolerance),
@@ -267,3 +268,9 @@ class SessionSettings:
         return limits is not None and bool(
             np.isfinite([limits.position_min[joint], limits.position_max[joint]]).all()
         )
+
+
+@cache
+def _no_limits(joints: int) -> JointLimits:
+    """Return the limits of joints that have none."""
+    return JointLimits.of(joints)

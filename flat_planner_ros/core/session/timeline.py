@@ -216,7 +216,10 @@ class Timeline:
             flat.append(motion.samples.flat[:, :, chosen])
             for name, parts in tables.items():
                 parts.append(getattr(motion.samples, name)[chosen])
-        joined = {name: np.concatenate(parts) for name, parts in tables.items()}
-        return Track(
-            start=start, times=np.concatenate(times), flat=np.concatenate(flat, axis=2), **joined
-        )
+        joined = {name: _joined(parts, 0) for name, parts in tables.items()}
+        return Track(start=start, times=_joined(times, 0), flat=_joined(flat, 2), **joined)
+
+
+def _joined(parts: Sequence[FloatArray], axis: int) -> FloatArray:
+    """Return arrays one after the other; one alone is taken as it is."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis)

@@ -21,6 +21,7 @@ motion, the report after it.
 """
 
 from collections.abc import Sequence
+import gc
 from importlib import import_module
 from threading import Lock, Thread
 
@@ -52,6 +53,8 @@ def load_early(node: Node, libraries: Sequence[str]) -> None:
         with LOADING:
             for library in libraries:
                 import_module(library)
+        # As when the node was ready: nothing of this needs to be collected.
+        gc.freeze()
 
     def start() -> None:
         timer.cancel()

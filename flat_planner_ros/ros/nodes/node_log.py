@@ -21,6 +21,7 @@ import select
 
 from flat_planner_ros.ros.wire import stamps
 from rclpy.clock import Clock, ClockType
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 
@@ -35,6 +36,9 @@ LONGEST = 2000
 
 NUMBER = re.compile(r'(?<!\w)[-+]?\d[\d.e+-]*')
 """Numbers do not make another kind of fault, but those in names do."""
+
+PLACE = ('NodeLog', __file__, 0)
+"""Function, file and line of all lines, for those who show them."""
 
 LOST = '{} lines could not be written: nobody reads them'
 """What is said once a console that was full can be written to again."""
@@ -149,10 +153,9 @@ class NodeLog:
 
     def _log(self, severity: LoggingSeverity, text: str) -> None:
         """Write a line."""
-        # A call for each: a logger refuses another severity from the same line.
-        if severity is LoggingSeverity.INFO:
-            self._logger.info(text)
-        elif severity is LoggingSeverity.WARN:
-            self._logger.warning(text)
-        else:
-            self._logger.error(text)
+        # Not by the logger's methods: they look up the place of their caller in its sources, which
+        # takes longer than planning a motion.
+        if self._logger.is_enabled_for(severity):
+            rclpy_implementation.rclpy_logging_rcutils_log(
+                severity, self._logger.name, text, *PLACE
+            )

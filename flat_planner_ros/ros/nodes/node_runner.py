@@ -17,6 +17,7 @@
 from argparse import ArgumentParser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import gc
 import os
 import re
 import signal
@@ -111,6 +112,9 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
             for node in nodes:
                 node.get_logger().info('ready')
             is_ready = True
+            # A collection would look at every object of every module again, for 40 ms each time,
+            # in which a goal or a sample waits.
+            gc.freeze()
             while rclpy.ok() and not interrupted.is_set():
                 executor.spin_once(timeout_sec=SPIN_PERIOD)
         except ExternalShutdownException:

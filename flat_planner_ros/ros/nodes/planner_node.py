@@ -197,7 +197,9 @@ class PlannerNode(GuardedNode):
         now = self._now()
         if self._actions is not None:
             self._actions.tick(now)
-        samples = self._session.reference(now)
+        # Whoever begins to listen hears the next one.
+        is_heard = self._reference.get_subscription_count() > 0
+        samples = self._session.reference(now) if is_heard else None
         if samples is not None:
             self._reference.publish(conversions.reference_msg(samples, self._joints, now))
 

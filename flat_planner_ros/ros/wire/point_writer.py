@@ -22,6 +22,7 @@ size, and each sequence begins with its length.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 import struct
 import sys
 
@@ -33,6 +34,12 @@ ARRAYS = 4
 
 ENCAPSULATION = bytes([0, sys.byteorder == 'little', 0, 0])
 """Front of a serialised message: plain CDR in the byte order of this machine; not aligned to."""
+
+LARGEST = 8
+"""Size of the longest entries, to which they are aligned [bytes]."""
+
+TYPES_KEPT = 32
+"""Types of points that are remembered."""
 
 LENGTH = struct.Struct('=I')
 """Number of entries of a sequence, or of characters with the zero at the end."""
@@ -109,6 +116,13 @@ def point_type(start: int, widths: Sequence[int], order: str = '=') -> np.dtype:
         Byte order as in struct: '=', '<' or '>'.
 
     """
+    # Entries are aligned to eight bytes at most.
+    return _point_type(start % LARGEST, tuple(widths), order)
+
+
+@lru_cache(maxsize=TYPES_KEPT)
+def _point_type(start: int, widths: tuple[int, ...], order: str) -> np.dtype:
+    """Return the type of a point, as `point_type`."""
     entries: list[tuple[str, object]] = []
     for field, width in enumerate(widths):
         entries.append((f'length{field}', f'{order}u4'))

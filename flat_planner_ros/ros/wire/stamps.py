@@ -40,7 +40,8 @@ def duration_msg(duration: float) -> Duration:
 
 def now(clock: Clock) -> float:
     """Return the present time of a clock [s]."""
-    return seconds(clock.now().to_msg())
+    sec, nanosec = divmod(clock.now().nanoseconds, NANOSECONDS)
+    return float(sec + nanosec / NANOSECONDS)
 
 
 def is_simulated(clock: Clock) -> bool:

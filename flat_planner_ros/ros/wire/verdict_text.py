@@ -95,7 +95,7 @@ def _stands_still(motion: Motion) -> bool:
     """Return whether a motion starts at rest where it ends, and passes no other point."""
     request = motion.plan.request
     is_plain = request.start_jets is None and not request.via
-    return is_plain and bool(np.allclose(request.start, request.final, rtol=0.0, atol=REACHED))
+    return is_plain and bool((np.abs(request.final - request.start) <= REACHED).all())
 
 
 def list_text(entries: Sequence[float | str]) -> str:

@@ -112,6 +112,29 @@ def test_the_place_of_the_worst_is_named():
     assert nominal == pytest.approx(predicted.nominal, rel=1e-12)
 
 
+def test_predictions_in_turn_do_not_mix():
+    """What is remembered of one arm, box, duration or number of samples serves no other."""
+    soft = ARM.scaled(stiffness=0.7, damping=1.0)
+    box, wide = UncertaintyBox(), UncertaintyBox(stiffness=0.3)
+    cases = [
+        (ARM, box, 1.0, 101),
+        (soft, box, 1.0, 101),
+        (ARM, wide, 1.0, 101),
+        (ARM, box, 1.5, 101),
+        (ARM, box, 1.0, 140),
+    ]
+    for arm, around, duration, points in [*cases, *reversed(cases)]:
+        _, effort = bump(duration, points)
+        found = predict_residual(arm, effort, duration, around)
+        oscillator = Oscillator.of(arm)
+        factors = np.concatenate([np.ones((1, 3)), *oscillator.edges(around, duration)])
+        poles = oscillator.poles(factors)
+        nominal, *others = residual_amplitude(oscillator, effort, duration, poles)
+        assert found.nominal == pytest.approx(nominal, rel=1e-12)
+        assert max(others) <= found.worst * (1.0 + 1e-12)
+        assert found.worst == pytest.approx(max(others), rel=2e-3)
+
+
 def test_a_box_without_size_is_the_nominal_arm():
     _, effort = bump(1.0)
     predicted = predict_residual(ARM, effort, 1.0, UncertaintyBox(stiffness=0.0, damping=0.0))

@@ -18,7 +18,7 @@ import re
 
 from flat_planner_ros.core.arm.errors import InvalidRequest
 from flat_planner_ros.core.arm.flat_map import FlatModel
-from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.arm.planar_arm import Drive, PlanarArm
 from flat_planner_ros.core.insensitive.insensitivity import Insensitivity, Nominal
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
 from flat_planner_ros.core.insensitive.residual import residual_amplitude
@@ -137,6 +137,20 @@ def test_advice_keeps_its_promise():
     longer = MotionRequest(start=np.zeros(2), final=np.array([np.pi, 0.0]), duration=1.2)
     options = PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY)
     assert residual_of_plan(plan(longer, ARM, options)).worst == pytest.approx(0.02, abs=5e-4)
+
+
+@pytest.mark.parametrize('drive', Drive)
+@pytest.mark.parametrize('way', [np.pi, -1.9, 2.5])
+def test_advice_for_any_way_and_arm_is_that_of_the_longer_plan(way, drive):
+    options = PlanningOptions(strategy=Strategy.MIN_POTENTIAL_ENERGY, drive=drive)
+    for arm in (ARM, ARM.scaled(stiffness=1.05, damping=1.0)):
+        start = np.array([0.4, 0.0])
+        request = MotionRequest(start=start, final=start + [way, 0.0], duration=1.0)
+        found = plan(request, arm, options)
+        line = duration_advice(found, residual_of_plan(found))
+        stretch = 1.0 + float(line.split(' %')[0]) / 100.0
+        longer = plan(request.stretched(stretch), arm, options)
+        assert f'to {residual_of_plan(longer).worst:.2g} rad' in line
 
 
 def test_no_advice_from_the_midst_of_a_motion():

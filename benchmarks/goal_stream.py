@@ -1,0 +1,233 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Goals of a planner in a process of its own, beside a plant and a monitor: how soon, how many.
+
+Single goals from rest to rest, and goals streamed to a target that moves. Times are those of a
+client in another process: from its publishing the goal to its hearing the command and the verdict,
+both ways through the middleware. `python benchmarks/run.py goal_stream` runs this alone.
+"""
+
+from argparse import Namespace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import hypot, pi, sin
+from time import perf_counter
+
+from diagnostic_msgs.msg import DiagnosticArray
+from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.ros.wire import interfaces, stamps
+from measurement import duration_text, Section, verdict
+import numpy as np
+import problem
+from processes import Listener, listener, NodeProcess, processes, SHIPPED
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+PERIOD = 0.0025
+"""Spacing of a command's points [s]."""
+
+DURATION = 0.5
+"""Of each motion [s]: 201 points."""
+
+PAUSE = 0.6
+"""From one goal from rest to the next [s]: the motion, and the time until it starts."""
+
+TARGETS = {'median': 1e-3, 'p99': 2e-3, 'verdict': 2e-3}
+"""From a single goal to its command, and to its verdict [s]."""
+
+RATES = (50.0, 200.0)
+"""Of the streams [Hz]."""
+
+LONGEST = 20.0
+"""Longest stream [s]."""
+
+SHARE = 0.5
+"""Share of one core that the planner may take for the fastest stream [-]."""
+
+AMPLITUDE, FREQUENCY = 0.5, 0.2
+"""Of the target that goals follow [rad], [Hz]."""
+
+SETTLING = 1.0
+"""Time after the last motion in which the passive joint is watched [s]."""
+
+
+def sections(options: Namespace) -> Iterator[Section]:
+    """Return the tables of this benchmark."""
+    yield _single_section(max(20, int(options.seconds / PAUSE)))
+    yield _stream_section(min(options.seconds, LONGEST))
+
+
+class _Client:
+    """
+    Who sends goals and notes when he hears what.
+
+    Parameters
+    ----------
+    ours
+        Node by which it is done.
+
+    """
+
+    def __init__(self, ours: Listener) -> None:
+        self.ours = ours
+        self.sent: list[float] = []
+        self.commanded: list[float] = []
+        self.judged: list[tuple[float, bytes]] = []
+        self._states: list[bytes] = []
+        node, planner = ours.node, interfaces.PLANNER
+        self._goals = node.create_publisher(
+            JointTrajectory, interfaces.topic_of(planner, interfaces.GOAL), interfaces.RELIABLE
+        )
+        # As bytes: reading them would be this process's work.
+        for kind, topic, heard, quality in (
+            (JointTrajectory, interfaces.COMMAND, self._on_command, interfaces.BURST),
+            (DiagnosticArray, interfaces.STATUS, self._on_verdict, interfaces.VERDICTS),
+        ):
+            name = interfaces.topic_of(planner, topic)
+            node.create_subscription(kind, name, heard, quality, raw=True)
+        ours.spin_until(self._goals.get_subscription_count, 'the planner')
+        self._watched = node.create_subscription(
+            JointState, interfaces.JOINT_STATES, self._states.append, 10, raw=True
+        )
+        ours.spin_until(lambda: self._states, 'the plant')
+        node.destroy_subscription(self._watched)
+
+    def _on_command(self, _: bytes) -> None:
+        self.commanded.append(perf_counter())
+
+    def _on_verdict(self, data: bytes) -> None:
+        if b'ACCEPTED' in data or b'REJECTED' in data:
+            self.judged.append((perf_counter(), data))
+
+    @property
+    def accepted(self) -> int:
+        """Return how many goals have been accepted."""
+        return sum(b'ACCEPTED' in data for _, data in self.judged)
+
+    def send(self, position: float) -> None:
+        """Send a goal of joint 1 [rad]."""
+        point = JointTrajectoryPoint(
+            positions=[position], time_from_start=stamps.duration_msg(DURATION)
+        )
+        goal = JointTrajectory(joint_names=['joint1'], points=[point])
+        self.sent.append(perf_counter())
+        self._goals.publish(goal)
+
+    def at_rate(self, rate: float, count: int, course: Callable[[float], float]) -> None:
+        """Send goals at a rate [Hz] to where a target is over time [s], and hear the answers."""
+        begin = perf_counter()
+        for number in range(count):
+            due = number / rate
+            self.send(course(due))
+            self.ours.spin(max(begin + due + 1.0 / rate - perf_counter(), 0.0))
+        self.ours.spin_until(lambda: len(self.judged) >= count, 'all verdicts')
+        self.ours.spin_until(lambda: len(self.commanded) >= self.accepted, 'all commands')
+
+    def delays(self, arrivals: list[float]) -> np.ndarray:
+        """Return the times from goals to what answers them, in the same order [s]."""
+        return np.array(arrivals) - np.array(self.sent[: len(arrivals)])
+
+    def residual(self, arm: PlanarArm) -> float:
+        """Return the largest amplitude of the passive joint after all motions [rad]."""
+        self.ours.spin(DURATION + SETTLING)
+        self._states.clear()
+        self.ours.node.create_subscription(
+            JointState, interfaces.JOINT_STATES, self._states.append, 10, raw=True
+        )
+        self.ours.spin(SETTLING)
+        mode, found = arm.natural_mode(), []
+        for data in self._states:
+            state = deserialize_message(data, JointState)
+            angle, rate = state.position[-1], state.velocity[-1]
+            speed = (rate + mode.decay_rate * angle) / mode.damped_frequency
+            found.append(hypot(angle, speed))
+        return max(found)
+
+
+@contextmanager
+def _nodes() -> Iterator[tuple[NodeProcess, _Client]]:
+    """Let a planner, a plant and a monitor live for a while, and a client beside them."""
+    planner = NodeProcess('planner', SHIPPED, {'sampling.period': f'{PERIOD:g}'})
+    others = NodeProcess('plant', SHIPPED, {}), NodeProcess('monitor', SHIPPED, {})
+    with processes(planner, *others), listener('goals_client') as ours:
+        client = _Client(ours)
+        # Libraries that are loaded soon after the start are loaded.
+        ours.spin(2.0)
+        planner.look()
+        yield planner, client
+        assert planner.is_running(), planner.log
+
+
+def _single_section(count: int) -> Section:
+    """Measure goals that come while the arm rests."""
+    with _nodes() as (planner, client):
+        client.at_rate(1.0 / PAUSE, count, lambda time: 0.3 + 0.1 * sin(1e3 * time))
+        assert client.accepted == count, planner.warnings[:3]
+    command = client.delays(client.commanded)
+    judged = client.delays([time for time, _ in client.judged])
+    median, late = np.percentile(command, (50, 99))
+    told = float(np.median(judged))
+    return Section(
+        f'Single goals, planner, plant and monitor at work, {round(DURATION / PERIOD) + 1} points',
+        ('from the goal to', 'median', 'p99', 'worst'),
+        [_delay_row('the command', command), _delay_row('the verdict', judged)],
+        [
+            f'{count} goals; command within {duration_text(TARGETS["median"])} (median): '
+            f'{verdict(median <= TARGETS["median"])}, {duration_text(TARGETS["p99"])} (p99): '
+            f'{verdict(late <= TARGETS["p99"])}; verdict within '
+            f'{duration_text(TARGETS["verdict"])}: {verdict(told <= TARGETS["verdict"])}'
+        ],
+    )
+
+
+def _stream_section(seconds: float) -> Section:
+    """Measure goals that follow a moving target."""
+    rows, notes = [], []
+    for rate in RATES:
+        count = round(rate * seconds)
+        with _nodes() as (planner, client):
+            client.at_rate(rate, count, lambda time: AMPLITUDE * sin(2.0 * pi * FREQUENCY * time))
+            usage, accepted = planner.look(), client.accepted
+            left = client.residual(problem.arm())
+        row = _delay_row(f'{rate:g} Hz', client.delays(client.commanded))
+        rows.append(
+            (
+                row[0],
+                f'{accepted} of {count}',
+                f'{100.0 * usage.share:.0f} %',
+                *row[1:],
+                f'{left:.1e}',
+            )
+        )
+        if rate == max(RATES):
+            is_met = accepted == count and usage.share <= SHARE
+            notes.append(
+                f'{rate:g} Hz, all accepted with at most {100.0 * SHARE:.0f} % of a core: '
+                f'{verdict(is_met)}'
+            )
+    return Section(
+        f'Goals streamed to a target that moves at up to '
+        f'{AMPLITUDE * 2.0 * pi * FREQUENCY:.2g} rad/s, for {seconds:g} s',
+        ('rate', 'accepted', 'CPU', 'to the command: median', 'p99', 'worst', 'left [rad]'),
+        rows,
+        notes,
+    )
+
+
+def _delay_row(name: str, delays: np.ndarray) -> tuple[str, ...]:
+    """Return a name, and median, 99th percentile and maximum of delays [s] as text."""
+    return name, *(duration_text(float(value)) for value in np.percentile(delays, (50, 99, 100)))
