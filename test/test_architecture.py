@@ -45,6 +45,7 @@ WINGS = {
     'monitor': 'model_fit arm',
     'tracking': 'arm',
     'model_fit': 'arm',
+    'excitation': 'planning model_fit arm',
 }
 """The wings of the core, each with the others from whose public lists it may import."""
 

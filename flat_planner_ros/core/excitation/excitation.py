@@ -1,0 +1,302 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The motion that tells most of the least certain parameter, one after the other.
+
+Greedy and of the kind of E-optimal designs (Fedorov, Theory of Optimal Experiments, 1972): among
+the motions that are allowed, the one after which the largest standard error, relative to its
+parameter's scale, is smallest. D-optimal motions would make what is certain more so.
+"""
+
+from dataclasses import dataclass
+from math import inf, pi
+
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.excitation.candidates import Bounds, Candidate, candidates
+from flat_planner_ros.core.excitation.settings import ExcitationSettings, Room
+from flat_planner_ros.core.model_fit import (
+    fit_model,
+    foresee,
+    information,
+    Measurements,
+    misprediction,
+    ModelFit,
+    NAMES,
+)
+from flat_planner_ros.core.planning import JointLimits, PlanningOptions
+import numpy as np
+
+SOUGHT = 6
+"""Parameters that are to become certain, of NAMES; offset and delay only have to be known with."""
+
+ROUGH = 0.3
+"""Standard error of what is believed at the start, relative to the scales [-]."""
+
+GROWTH = 2.0
+"""How much larger a motion may be than one that was as predicted [-]."""
+
+WIDE, NARROW = 0.5, 0.2
+"""Margins of what is foreseen, before a motion was as predicted and after [-]."""
+
+APART = 100.0
+"""Time put between two motions in the measurements [s]: a gap that no segment spans."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Proposal:
+    """
+    The motion to carry out next.
+
+    Attributes
+    ----------
+    candidate
+        Goal, duration, and what is foreseen.
+    sought
+        The parameter that is least certain.
+    before, after
+        Standard errors of all NAMES relative to their scales: now, and as predicted for after the
+        motion, shape (8,) [-].
+    scales
+        Shape (8,).
+
+    """
+
+    candidate: Candidate
+    sought: str
+    before: FloatArray
+    after: FloatArray
+    scales: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Heard:
+    """
+    What a motion has told.
+
+    Attributes
+    ----------
+    misprediction
+        Of the model before it, relative to the motion: of link n-1 and of the passive joint (2,).
+    holds
+        Whether the prediction held, so that the next motion may be larger.
+    fit
+        Of all motions so far; None if there is no model that explains them.
+    reached
+        Standard errors of the fit relative to the scales, shape (8,) [-].
+
+    """
+
+    misprediction: FloatArray
+    holds: bool
+    fit: ModelFit | None
+    reached: FloatArray
+
+
+class Excitation:
+    """
+    Chooses motions, learns from them, and grows only while they go as predicted.
+
+    The first motion may use a share of the effort limit and of the range. Each motion is predicted
+    by the model of all before it, from the efforts that acted; only one that went as predicted
+    lets the next be larger.
+
+    Parameters
+    ----------
+    arm, options, limits
+        Model, options and limits of the planner that plans the goals.
+    room
+        Where the arm may be.
+    settings
+        What to reach, and how carefully.
+
+    """
+
+    def __init__(
+        self,
+        arm: PlanarArm,
+        options: PlanningOptions,
+        limits: JointLimits,
+        room: Room,
+        settings: ExcitationSettings | None = None,
+    ) -> None:
+        """Know what the parameter file says, roughly."""
+        self.settings = settings or ExcitationSettings()
+        self._arm = arm
+        self._options = options
+        self._limits = limits
+        self._room = room
+        self._share = self.settings.first_share
+        self._margin = WIDE
+        self._attempts = 0
+        self._estimate = arm
+        self._noise = np.full(2, self.settings.noise)
+        self._known = np.zeros((len(NAMES), len(NAMES)))
+        self._reached = np.full(len(NAMES), inf)
+        self._scales = np.zeros(len(NAMES))
+        self._parts: list[Measurements] = []
+
+    @property
+    def estimate(self) -> PlanarArm:
+        """Return the model so far."""
+        return self._estimate
+
+    @property
+    def share(self) -> float:
+        """Return the share of effort limit and range that the next motion may use [-]."""
+        return self._share
+
+    @property
+    def measurements(self) -> Measurements:
+        """Return all motions so far, with gaps between them."""
+        return _joined(self._parts)
+
+    @property
+    def record_time(self) -> float:
+        """Return how long the arm is to be recorded after a motion [s]."""
+        return self.settings.rest * 2 * pi / self._estimate.natural_mode().frequency
+
+    @property
+    def is_certain(self) -> bool:
+        """Tell whether every parameter is as certain as wanted."""
+        return bool((self._reached[:SOUGHT] <= self.settings.accuracy).all())
+
+    @property
+    def is_done(self) -> bool:
+        """Tell whether there is nothing more to be done."""
+        return self.is_certain or len(self._parts) >= self.settings.most_motions
+
+    def propose(self, here: FloatArray) -> Proposal:
+        """
+        Return the motion that makes the least certain parameter most certain.
+
+        Parameters
+        ----------
+        here
+            Measured joint angles, shape (n,) [rad].
+
+        Raises
+        ------
+        InvalidRequest
+            No motion is allowed from here.
+
+        """
+        bounds = Bounds(
+            limits=self._limits, room=self._room, share=self._share, margin=self._margin
+        )
+        found = [
+            (candidate, *information(self._estimate, candidate.motion, self._noise))
+            for candidate in candidates(
+                here, self._arm, self._options, self._estimate, bounds, self.settings.rest
+            )
+        ]
+        if not found:
+            raise InvalidRequest(
+                f'no motion from {here[-2]:.4g} rad stays within {self._share:.2g} of the effort '
+                f'limit {self._room.effort:.4g} N m and between {self._room.low:.4g} and '
+                f'{self._room.high:.4g} rad; raise the limits, or let the arm swing out'
+            )
+        self._scales = np.maximum(self._scales, np.max([scales for *_, scales in found], axis=0))
+        after = [self._errors(self._known + told) for _, told, _ in found]
+        best = min(range(len(found)), key=lambda index: after[index][:SOUGHT].max())
+        before = self._errors(self._known)
+        return Proposal(
+            candidate=found[best][0],
+            sought=NAMES[int(np.argmax(before[:SOUGHT]))],
+            before=before,
+            after=after[best],
+            scales=self._scales,
+        )
+
+    def hear(self, measurements: Measurements) -> Heard:
+        """
+        Learn from a motion that was carried out.
+
+        Parameters
+        ----------
+        measurements
+            Of the motion and of the time after it.
+
+        Raises
+        ------
+        InvalidRequest
+            Motions of one size were mispredicted too often: the arm is not what the model says.
+
+        """
+        wrong = misprediction(self._estimate, measurements)
+        holds = bool((wrong <= self.settings.agreement).all())
+        self._parts.append(measurements)
+        fit = self._fitted()
+        if fit is not None:
+            self._estimate = fit.arm
+            self._noise = np.maximum(fit.residual_rms, 1e-9)
+            stds = np.array([estimate.std for estimate in fit.estimates[: len(NAMES)]])
+            self._reached = stds / self._scales
+        self._known = self._known + self._told(measurements)
+        self._grow(holds, wrong)
+        return Heard(misprediction=wrong, holds=holds, fit=fit, reached=self._reached)
+
+    def _fitted(self) -> ModelFit | None:
+        """Return the fit of all motions, None if no model explains them at all."""
+        try:
+            # From little that is told a fit tries models that run away.
+            with np.errstate(over='ignore', invalid='ignore'):
+                return fit_model(self.measurements, self._arm)
+        except (FlatPlannerError, np.linalg.LinAlgError):
+            return None
+
+    def _told(self, measurements: Measurements) -> FloatArray:
+        """Return the information of a motion by the present model and noise, shape (8, 8)."""
+        count = round(float(np.ptp(measurements.times)) / measurements.period)
+        times = np.linspace(0.0, count * measurements.period, count + 1)
+        since = measurements.times - measurements.times[0]
+        effort = np.interp(times, since, measurements.efforts[:, -1])
+        told, _ = information(self._estimate, foresee(self._estimate, times, effort), self._noise)
+        return told
+
+    def _grow(self, holds: bool, wrong: FloatArray) -> None:
+        """Allow more after a prediction that held, and give up after too many that did not."""
+        if holds:
+            self._share = min(GROWTH * self._share, 1.0)
+            self._margin, self._attempts = NARROW, 0
+            return
+        self._attempts += 1
+        if self._attempts >= self.settings.most_attempts:
+            raise InvalidRequest(
+                f'{self._attempts} motions of one size were mispredicted, the last by '
+                f'{wrong[0]:.2g} of the motion of link n-1 and {wrong[1]:.2g} of that of the '
+                'passive joint: are signs and units of joints and efforts right, is friction '
+                'above the effort, does something touch the arm?'
+            )
+
+    def _errors(self, known: FloatArray) -> FloatArray:
+        """Return standard errors relative to the scales (8,), from what is known and believed."""
+        size = np.outer(self._scales, self._scales)
+        inside = known * size + np.eye(len(NAMES)) / ROUGH**2
+        result: FloatArray = np.sqrt(np.diag(np.linalg.inv(inside)))
+        return result
+
+
+def _joined(parts: list[Measurements]) -> Measurements:
+    """Return motions one after the other, with gaps between them."""
+    times = []
+    begin = 0.0
+    for part in parts:
+        times.append(part.times - part.times[0] + begin)
+        begin = float(times[-1][-1]) + APART
+    return Measurements(
+        times=np.concatenate(times),
+        positions=np.concatenate([part.positions for part in parts]),
+        efforts=np.concatenate([part.efforts for part in parts]),
+    )
