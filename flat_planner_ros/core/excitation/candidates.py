@@ -24,11 +24,14 @@ from flat_planner_ros.core.model_fit import foresee, ForeseenMotion
 from flat_planner_ros.core.planning import JointLimits, MotionRequest, plan, PlanningOptions
 import numpy as np
 
-DURATIONS = (1.0, 1.5, 2.25, 3.4, 5.0)
+DURATIONS = (1.0, 1.6, 2.6, 4.2)
 """Durations that are tried, in free periods of the passive joint [-]."""
 
-DISTANCES = (1.0, 0.5, 0.25)
+DISTANCES = (1.0, 0.4)
 """Distances that are tried, relative to the largest that is allowed [-]."""
+
+REFINEMENT = 0.3
+"""Refinement of the steps with which motions are compared: many, and not to be followed [-]."""
 
 SAMPLING = 0.005
 """Time between samples that are foreseen [s]."""
@@ -138,7 +141,7 @@ def candidates(
             effort, peak = found
             effort = np.append(effort, np.zeros(round(rest * period / SAMPLING)))
             times = np.linspace(0.0, SAMPLING * (effort.size - 1), effort.size)
-            motion = foresee(estimate, times, effort)
+            motion = foresee(estimate, times, effort, REFINEMENT)
             if bounds.allow(motion, at):
                 yield Candidate(
                     final=final, duration=duration * period, peak_effort=peak, motion=motion

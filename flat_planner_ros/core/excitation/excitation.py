@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from math import inf, pi
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, PlanarArm
-from flat_planner_ros.core.excitation.candidates import Bounds, Candidate, candidates
+from flat_planner_ros.core.excitation.candidates import Bounds, Candidate, candidates, REFINEMENT
 from flat_planner_ros.core.excitation.settings import ExcitationSettings, Room
 from flat_planner_ros.core.model_fit import (
     fit_model,
@@ -49,6 +49,18 @@ GROWTH = 2.0
 
 WIDE, NARROW = 0.5, 0.2
 """Margins of what is foreseen, before a motion was as predicted and after [-]."""
+
+KEPT = 6
+"""Motions, the last ones, to which the model is fitted on the way: earlier ones are smaller."""
+
+STANDS = 20.0
+"""Range of the angle of joint n-1, in terms of the noise, below which it has not moved [-]."""
+
+PLAUSIBLE = 5.0
+"""Largest factor between inertias or stiffness found and believed, either way [-]."""
+
+MOVED = 0.03
+"""Share of the planned distance that shows in which direction the arm moved [-]."""
 
 APART = 100.0
 """Time put between two motions in the measurements [s]: a gap that no segment spans."""
@@ -146,6 +158,7 @@ class Excitation:
         self._reached = np.full(len(NAMES), inf)
         self._scales = np.zeros(len(NAMES))
         self._parts: list[Measurements] = []
+        self._planned = 0.0
 
     @property
     def estimate(self) -> PlanarArm:
@@ -174,8 +187,10 @@ class Excitation:
 
     @property
     def is_done(self) -> bool:
-        """Tell whether there is nothing more to be done."""
-        return self.is_certain or len(self._parts) >= self.settings.most_motions
+        """Tell whether there is nothing more to be done: certain, and one prediction held."""
+        return (self.is_certain and self._margin == NARROW) or len(
+            self._parts
+        ) >= self.settings.most_motions
 
     def propose(self, here: FloatArray) -> Proposal:
         """
@@ -196,7 +211,7 @@ class Excitation:
             limits=self._limits, room=self._room, share=self._share, margin=self._margin
         )
         found = [
-            (candidate, *information(self._estimate, candidate.motion, self._noise))
+            (candidate, *information(self._estimate, candidate.motion, self._noise, REFINEMENT))
             for candidate in candidates(
                 here, self._arm, self._options, self._estimate, bounds, self.settings.rest
             )
@@ -211,6 +226,7 @@ class Excitation:
         after = [self._errors(self._known + told) for _, told, _ in found]
         best = min(range(len(found)), key=lambda index: after[index][:SOUGHT].max())
         before = self._errors(self._known)
+        self._planned = float(found[best][0].final[-2] - here[-2])
         return Proposal(
             candidate=found[best][0],
             sought=NAMES[int(np.argmax(before[:SOUGHT]))],
@@ -231,9 +247,11 @@ class Excitation:
         Raises
         ------
         InvalidRequest
-            Motions of one size were mispredicted too often: the arm is not what the model says.
+            Motions of one size were mispredicted too often, or signs contradict each other: the
+            arm is not what the model says.
 
         """
+        self._check_signs(measurements)
         wrong = misprediction(self._estimate, measurements)
         holds = bool((wrong <= self.settings.agreement).all())
         self._parts.append(measurements)
@@ -247,14 +265,40 @@ class Excitation:
         self._grow(holds, wrong)
         return Heard(misprediction=wrong, holds=holds, fit=fit, reached=self._reached)
 
+    def _check_signs(self, measurements: Measurements) -> None:
+        """Refuse an arm that moves the other way, or whose efforts would move it that way."""
+        angles = measurements.positions[:, -2]
+        travelled = float(angles[-1] - angles[0])
+        if abs(travelled) < MOVED * abs(self._planned):
+            return
+        if travelled * self._planned < 0.0:
+            raise InvalidRequest(
+                f'joint n-1 turned by {travelled:.3g} rad where {self._planned:.3g} rad were '
+                'planned: the sign of its effort or of its angle is wrong'
+            )
+        steps = np.gradient(measurements.times)
+        momentum = np.cumsum(measurements.efforts[:, -1] * steps)
+        if float(momentum @ steps) * travelled < 0.0:
+            raise InvalidRequest(
+                f'joint n-1 turned by {travelled:.3g} rad, its measured efforts would turn it the '
+                'other way: their sign is wrong'
+            )
+
     def _fitted(self) -> ModelFit | None:
-        """Return the fit of all motions, None if no model explains them at all."""
+        """Return the fit of the last motions, None if no plausible model explains them."""
+        if np.ptp(self._parts[-1].positions[:, -2]) < STANDS * self.settings.noise:
+            return None
         try:
             # From little that is told a fit tries models that run away.
             with np.errstate(over='ignore', invalid='ignore'):
-                return fit_model(self.measurements, self._arm)
+                fit = fit_model(_joined(self._parts[-KEPT:]), self._arm)
         except (FlatPlannerError, np.linalg.LinAlgError):
             return None
+        found, believed = (
+            np.array([*arm.inertia_star, arm.stiffness]) for arm in (fit.arm, self._arm)
+        )
+        is_plausible = (np.maximum(found / believed, believed / found) < PLAUSIBLE).all()
+        return fit if is_plausible else None
 
     def _told(self, measurements: Measurements) -> FloatArray:
         """Return the information of a motion by the present model and noise, shape (8, 8)."""
@@ -276,8 +320,8 @@ class Excitation:
             raise InvalidRequest(
                 f'{self._attempts} motions of one size were mispredicted, the last by '
                 f'{wrong[0]:.2g} of the motion of link n-1 and {wrong[1]:.2g} of that of the '
-                'passive joint: are signs and units of joints and efforts right, is friction '
-                'above the effort, does something touch the arm?'
+                'passive joint: are the units of the efforts right, is friction above '
+                f'{self._share:.2g} of the effort limit, does something touch the arm?'
             )
 
     def _errors(self, known: FloatArray) -> FloatArray:

@@ -55,7 +55,9 @@ class ForeseenMotion:
     effort: FloatArray
 
 
-def foresee(arm: PlanarArm, times: FloatArray, effort: FloatArray) -> ForeseenMotion:
+def foresee(
+    arm: PlanarArm, times: FloatArray, effort: FloatArray, refinement: float = 1.0
+) -> ForeseenMotion:
     """
     Return the motion that an effort makes, from zero angles at rest.
 
@@ -67,11 +69,14 @@ def foresee(arm: PlanarArm, times: FloatArray, effort: FloatArray) -> ForeseenMo
         Even, shape (m,) [s].
     effort
         Of joint n-1 at these times, shape (m,) [N m].
+    refinement
+        By which the steps of the integration are divided [-].
 
     """
     model = vector_of(arm)[None]
     period = float(times[1] - times[0])
-    parts = int(np.ceil(period / step_for(model[0], bool(model[0, COULOMB]))))
+    longest = step_for(model[0], bool(model[0, COULOMB])) / refinement
+    parts = int(np.ceil(period / longest))
     grid = times[0] + np.arange(2 * parts * (times.size - 1) + 1) * period / (2 * parts)
     forcing = Forcing(
         step=period / parts,
@@ -84,7 +89,7 @@ def foresee(arm: PlanarArm, times: FloatArray, effort: FloatArray) -> ForeseenMo
 
 
 def information(
-    arm: PlanarArm, motion: ForeseenMotion, noise: FloatArray
+    arm: PlanarArm, motion: ForeseenMotion, noise: FloatArray, refinement: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """
     Return the Fisher information that a recording of a motion will hold, and the scales.
@@ -97,6 +102,8 @@ def information(
         As `foresee` has it for this model.
     noise
         Standard deviation of the angle of link n-1 and of the passive joint, shape (2,) [rad].
+    refinement
+        By which the steps of the integration are divided [-].
 
     Returns
     -------
@@ -121,6 +128,7 @@ def information(
         rounding=np.zeros(CHANNELS),
         segments=segments_of(motion.times, period, SEGMENT * _free_period(arm)),
         is_linear=True,
+        refinement=refinement,
     )
     model = vector_of(arm)
     scales = scales_of(observed, model)

@@ -60,6 +60,9 @@ CONVERGED = 1e-4
 SMALLEST = 1e-7
 """Last step that is always small enough, relative to the scales [-]."""
 
+SHORTEST_STEP = 2.5e-4
+"""Step of the integration that a model may need if the one before it does not [s]."""
+
 MOST_DAMPING = 1e8
 """Marquardt's parameter from which nothing better is expected [-]."""
 
@@ -290,10 +293,12 @@ def _stepped(
 ) -> tuple[FloatArray, FloatArray]:
     """Return parameters and starts after a step, shortened until the model has a meaning."""
     share = 1.0
+    shortest = min(SHORTEST_STEP, step_for(point[0], has_friction=True))
     while True:
         parameters = point[0].copy()
         parameters[list(free)] += share * step
-        if parameters[BOTH] > parameters[LAST] > 0.0 < parameters[STIFFNESS]:
+        has_meaning = parameters[BOTH] > parameters[LAST] > 0.0 < parameters[STIFFNESS]
+        if has_meaning and step_for(parameters, has_friction=True) >= shortest:
             break
         share /= 2
     moved = np.array([own + by @ (share * step) for own, by in around.corrections])
