@@ -22,13 +22,11 @@ more stiffly than their neighbours do: in the jets' normal equations the neighbo
 each condition keeps its own scale.
 """
 
-from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, row_factors, SOLUTIONS
-from flat_planner_ros.core.motion_law.segment_bases import SegmentBasis
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,10 +68,11 @@ class ContinuitySystem:
 
     Parameters
     ----------
-    bases
-        Solutions of every segment.
-    halves
-        Half the segments' lengths, shape (p,) [s].
+    places
+        Derivatives 0 to 11 of every solution at the start, in the middle and at the end of every
+        segment, shape (3, p, 12, 12) [1/s^k].
+    rates
+        How fast the solutions grow, as those of `SegmentBases`, shape (p, 6) [1/s].
     relaxation
         Via points prescribe w + relaxation w' [s].
 
@@ -84,21 +83,16 @@ class ContinuitySystem:
 
     """
 
-    def __init__(
-        self, bases: Sequence[SegmentBasis], halves: FloatArray, relaxation: float
-    ) -> None:
+    def __init__(self, places: FloatArray, rates: FloatArray, relaxation: float) -> None:
         """Fill the blocks and scale their rows, then their columns, to the same size."""
-        powers = halves[:, None] ** -np.arange(float(SOLUTIONS))
-        at_start = np.array([basis.at_start for basis in bases]) * powers[:, :, None]
-        at_end = np.array([basis.at_end for basis in bases]) * powers[:, :, None]
-        rates = np.array([basis.rates for basis in bases]) / halves[:, None]
+        at_start, _, at_end = places
         self._start_factors = row_factors(rates[0].tolist())
         self._end_factors = row_factors(rates[-1].tolist())
         # The faster segment's rates: only it can fulfil the conditions on high derivatives.
         self._knot_factors = _knot_factors(np.maximum(rates[:-1], rates[1:]))
         start = at_start[0, :CONDITIONS] * self._start_factors[:, None]
         end = at_end[-1, :CONDITIONS] * self._end_factors[:, None]
-        knots = np.zeros((len(bases) - 1, SOLUTIONS, 2 * SOLUTIONS))
+        knots = np.zeros((len(rates) - 1, SOLUTIONS, 2 * SOLUTIONS))
         _fill_knots(knots[:, :, :SOLUTIONS], at_end[:-1], relaxation, 0)
         _fill_knots(knots[:, :, SOLUTIONS:], -at_start[1:], relaxation, 1)
         knots *= self._knot_factors[:, :, None]

@@ -29,7 +29,8 @@ from math import ceil, log2
 from typing import Protocol, Self
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
-from flat_planner_ros.core.motion_law.terms import Term, term_sum, TermSum, TOP_ORDER
+from flat_planner_ros.core.motion_law.term_sum import term_sum, TermSum
+from flat_planner_ros.core.motion_law.terms import Term, TOP_ORDER
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -167,6 +168,25 @@ class ExponentialLaw(ScaledLaw):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class SummedLaw(ScaledLaw):
+    """
+    A sum of terms that is ready for evaluation, up to the order `TOP_ORDER`.
+
+    Attributes
+    ----------
+    total
+        In normalised time; scaled and shifted, it is the value [rad].
+
+    """
+
+    total: TermSum
+
+    def normalised_jet(self, distances: FloatArray, order: int) -> FloatArray:
+        """Return the sum of the terms and its derivatives, as `ScaledLaw.normalised_jet`."""
+        return self.total.at(distances, order)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PiecewiseLaw:
     """
     A `Law` made of one law for each segment.
@@ -181,7 +201,7 @@ class PiecewiseLaw:
     """
 
     edges: FloatArray
-    laws: tuple[ExponentialLaw, ...]
+    laws: tuple[SummedLaw, ...]
 
     def __post_init__(self) -> None:
         """Lock the edges."""

@@ -19,7 +19,6 @@ Between via points it solves the Euler-Lagrange equation; at a via point everyth
 but the costate of the prescribed value (docs/derivation.md, section V).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import ceil, log2
@@ -29,9 +28,8 @@ from flat_planner_ros.core.arm import checked_array, FloatArray, InvalidRequest,
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
 from flat_planner_ros.core.motion_law.continuity import Amplitudes, ContinuitySystem
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
-from flat_planner_ros.core.motion_law.extremal import costate, rounded, stationarity_residual
-from flat_planner_ros.core.motion_law.law import ExponentialLaw, MAX_DERIVATIVE, PiecewiseLaw
-from flat_planner_ros.core.motion_law.segment_bases import segment_bases, SegmentBasis
+from flat_planner_ros.core.motion_law.law import MAX_DERIVATIVE, PiecewiseLaw, SummedLaw
+from flat_planner_ros.core.motion_law.segment_bases import segment_bases, SegmentBases
 import numpy as np
 from numpy.typing import NDArray
 
@@ -126,20 +124,10 @@ def optimal_path(cost: QuadraticCost, path: PathConditions) -> OptimalPath:
         The numbers leave double precision.
 
     """
-    bases, halves, origins, steps, amplitudes, _ = solved_path(cost, path)
-    parts = []
-    for variable, (origin, step) in enumerate(zip(origins, steps, strict=True)):
-        laws = tuple(
-            ExponentialLaw(duration=2.0 * half, terms=basis.combined(values), offset=place)
-            for basis, half, values, place in zip(
-                bases, halves, amplitudes.values[:, :, variable], origin, strict=True
-            )
-        )
-        jets = [_probed(law, basis) for law, basis in zip(laws, bases, strict=True)]
-        correction = amplitudes.correction[:, variable]
-        parts.append(_certified(cost, path, variable, laws, jets, step, correction))
+    found = solved_path(cost, path)
+    parts = [_certified(cost, path, found, variable) for variable in range(len(path.values))]
     # Times are rounded: a segment's length is known to this part of it, and slopes with it.
-    rounding = float(np.finfo(float).eps * path.edges[-1] / (2.0 * halves.min()))
+    rounding = float(np.finfo(float).eps * path.edges[-1] / (2.0 * found.halves.min()))
     return OptimalPath(
         laws=tuple(law for part in parts for law in part.laws),
         cost_value=sum(part.cost_value for part in parts),
@@ -156,9 +144,12 @@ class PathSolution(NamedTuple):
     Attributes
     ----------
     bases
-        Solutions of every segment.
+        Solutions on all segments.
     halves
         Half the segments' lengths, shape (p,) [s].
+    places
+        Derivatives 0 to 11 of every solution at the start, in the middle and at the end of every
+        segment, shape (3, p, 12, 12) [1/s^k].
     origins
         Value at the start of every segment, shape (m, p) [rad].
     steps
@@ -170,8 +161,9 @@ class PathSolution(NamedTuple):
 
     """
 
-    bases: list[SegmentBasis]
+    bases: SegmentBases
     halves: FloatArray
+    places: FloatArray
     origins: FloatArray
     steps: FloatArray
     amplitudes: Amplitudes
@@ -180,72 +172,70 @@ class PathSolution(NamedTuple):
 
 def solved_path(cost: QuadraticCost, path: PathConditions) -> PathSolution:
     """Return the laws of least cost in terms of the solutions on every segment."""
-    coefficients = cost.characteristic()
     halves = 0.5 * np.diff(path.edges)
-    powers = halves[:, None] ** np.arange(SOLUTIONS, -1.0, -2.0)
-    reference = _reference(coefficients).tobytes()
-    keys = [key.tobytes() for key in rounded(coefficients * powers)]
-    bases = segment_bases(keys, reference)
+    unit = _unit(cost.characteristic())
+    reference = cost.characteristic() * unit ** np.arange(SOLUTIONS, -1.0, -2.0)
+    bases = segment_bases(reference, halves / unit)
+    places = bases.places * (halves[:, None] ** -np.arange(float(SOLUTIONS)))[:, :, None]
     # Each segment counts from the value at its start: only steps enter the equations, and a short
     # segment far from zero loses no digits.
     origins = np.column_stack([path.start[:, 0], path.values[:, :-1]])
     steps = path.values - origins
-    return PathSolution(bases, halves, origins, steps, *_amplitudes(bases, halves, path, steps))
+    rates = bases.rates / halves[:, None]
+    return PathSolution(
+        bases, halves, places, origins, steps, *_amplitudes(places, rates, path, steps)
+    )
 
 
 def _certified(
-    cost: QuadraticCost,
-    path: PathConditions,
-    variable: int,
-    laws: tuple[ExponentialLaw, ...],
-    jets: Sequence[FloatArray],
-    steps: FloatArray,
-    correction: FloatArray,
+    cost: QuadraticCost, path: PathConditions, found: PathSolution, variable: int
 ) -> OptimalPath:
     """Return one variable's law with its share of the cost and the residuals of its jets."""
+    laws, jets = _laws(found, variable)
     coefficients = cost.characteristic()
     relaxation = float(path.relaxations[variable])
     peaks = _peaks(path.start[variable, 0], jets)
     if not peaks.max() < MAX_DERIVATIVE:
         raise OverflowError(f'derivatives exceed {MAX_DERIVATIVE:g}')
     # Constant along each segment: taken in its middle.
-    costates = np.array([costate(coefficients, jet[:, -1:])[0] for jet in jets])
-    ends = np.array([jet[:, :2].T for jet in jets])  # (p, 2, 13)
+    costates = -jets[:, 1:-1:2, -1] @ coefficients[1:]
+    ends = jets[:, :, :2].swapaxes(1, 2)  # (p, 2, 13)
     before = ends[:-1, 1]
     return OptimalPath(
         laws=(PiecewiseLaw(edges=path.edges, laws=laws),),
-        cost_value=float(costates @ steps - share_of_start(cost, jets[0][:, 0])),
+        cost_value=float(
+            costates @ found.steps[variable]
+            - share_of_start(cost, path.start[variable], jets[0, :, 0])
+        ),
         time_slopes=2.0 * np.diff(costates) * (before[:, 1] + relaxation * before[:, 2]),
         boundary_residual=max(
-            _relative(correction, peaks[: CONDITIONS + 1]),
+            _relative(found.amplitudes.correction[:, variable], peaks[: CONDITIONS + 1]),
             _boundary_residual(path, variable, ends, peaks[:CONDITIONS]),
         ),
         optimality_residual=max(
             _natural_residual(relaxation, ends[1:, 0] - before, peaks),
-            *(stationarity_residual(coefficients, jet) for jet in jets),
+            _stationarity_residual(coefficients, jets),
         ),
     )
 
 
-def _reference(coefficients: FloatArray) -> FloatArray:
-    """Return an equation in units of time, a power of two, in which its roots are of size 1."""
+def _unit(coefficients: FloatArray) -> float:
+    """Return a unit of time, a power of two, in which the roots of an equation are of size 1."""
     sizes = np.abs(coefficients[-2::-1]).tolist()
     largest = max(size ** (0.5 / n) for n, size in enumerate(sizes, start=1))
-    unit = 2.0 ** -round(log2(largest)) if largest else 1.0
-    reference: FloatArray = coefficients * unit ** np.arange(SOLUTIONS, -1.0, -2.0)
-    return reference
+    return 2.0 ** -round(log2(largest)) if largest else 1.0
 
 
 def _amplitudes(
-    bases: Sequence[SegmentBasis], halves: FloatArray, path: PathConditions, steps: FloatArray
+    places: FloatArray, rates: FloatArray, path: PathConditions, steps: FloatArray
 ) -> tuple[Amplitudes, list[tuple[ContinuitySystem, BoolArray]]]:
     """Return the amplitudes of all solutions; equal relaxations share one factorisation."""
-    values = np.empty((len(bases), SOLUTIONS, len(steps)))
+    values = np.empty((len(rates), SOLUTIONS, len(steps)))
     correction = np.empty((CONDITIONS + 1, len(steps)))
     systems = []
-    for relaxation in np.unique(path.relaxations):
+    for relaxation in sorted(set(path.relaxations.tolist())):
         alike = path.relaxations == relaxation
-        system = ContinuitySystem(bases, halves, float(relaxation))
+        system = ContinuitySystem(places, rates, relaxation)
         found = system.solve(path.start[alike, 1:].T, steps[alike].T)
         values[:, :, alike] = found.values
         correction[:, alike] = found.correction
@@ -253,15 +243,37 @@ def _amplitudes(
     return Amplitudes(values, correction), systems
 
 
-def _probed(law: ExponentialLaw, basis: SegmentBasis) -> FloatArray:
+def _laws(found: PathSolution, variable: int) -> tuple[tuple[SummedLaw, ...], FloatArray]:
     """
-    Return derivatives 0 to 12 of a segment at both ends, at probes, and in the middle.
+    Return one variable's laws, and derivatives 0 to 12 at both ends, at probes, in the middle.
 
-    The probes crowd towards the ends as far as boundary layers can reach, shape (13, m).
+    The probes crowd towards the ends as far as boundary layers can reach, shape (p, 13, m).
     """
-    near = _near(min(MAX_DEPTH, ceil(log2(basis.rates[-1])) + 3))
-    times = 0.5 * law.duration * np.concatenate([[0.0, 2.0], near, 2.0 - near, [1.0]])
-    return law.jet(times, SOLUTIONS)
+    depth = min(MAX_DEPTH, ceil(log2(found.bases.rates[:, -1].max())) + 3)
+    distances = _probes(depth)
+    jets = np.empty((len(found.halves), SOLUTIONS + 1, distances.shape[1]))
+    laws: dict[int, SummedLaw] = {}
+    for group in found.bases.groups:
+        sums = group.sums(found.amplitudes.values[group.segments, :, variable])
+        jets[group.segments] = sums.at(distances)
+        for index, total in zip(group.segments.tolist(), sums.singles(), strict=True):
+            laws[index] = SummedLaw(
+                duration=2.0 * float(found.halves[index]),
+                total=total,
+                offset=float(found.origins[variable, index]),
+            )
+    jets *= (found.halves[:, None] ** -np.arange(SOLUTIONS + 1.0))[:, :, None]
+    jets[:, 0] += found.origins[variable, :, None]
+    return tuple(laws[index] for index in range(len(laws))), jets
+
+
+@cache
+def _probes(depth: int) -> FloatArray:
+    """Return x + 1 and 1 - x at both ends, at probes and in the middle, shape (2, m)."""
+    near = _near(depth)
+    after_start = np.concatenate([[0.0, 2.0], near, 2.0 - near, [1.0]])
+    before_end = np.concatenate([[2.0, 0.0], 2.0 - near, near, [1.0]])
+    return np.array([after_start, before_end])
 
 
 @cache
@@ -297,10 +309,16 @@ def _natural_residual(relaxation: float, jumps: FloatArray, peaks: FloatArray) -
     return _relative(largest, sizes)
 
 
-def _peaks(start: float, jets: Sequence[FloatArray]) -> FloatArray:
+def _stationarity_residual(coefficients: FloatArray, jets: FloatArray) -> float:
+    """Return the largest residual of the Euler-Lagrange equation on any segment, (p, 13, m)."""
+    even = jets[:, 2::2]
+    sizes = (np.abs(coefficients[1:]) @ np.abs(even)).max(axis=1)
+    return _relative(np.abs(coefficients[1:] @ even).max(axis=1), sizes)
+
+
+def _peaks(start: float, jets: FloatArray) -> FloatArray:
     """Return the largest magnitudes of all derivatives, the value's relative to the start."""
-    highest = np.max([jet.max(axis=1) for jet in jets], axis=0)
-    lowest = np.min([jet.min(axis=1) for jet in jets], axis=0)
+    highest, lowest = jets.max(axis=(0, 2)), jets.min(axis=(0, 2))
     highest[0] -= start
     lowest[0] -= start
     peaks: FloatArray = np.maximum(highest, -lowest)
@@ -312,18 +330,27 @@ def _relative(missed: FloatArray, sizes: FloatArray) -> float:
     return float((missed[missed > 0.0] / sizes[missed > 0.0]).max(initial=0.0))
 
 
-def share_of_start(cost: QuadraticCost, jet: FloatArray) -> float:
+def share_of_start(cost: QuadraticCost, start: FloatArray, jet: FloatArray) -> float:
     """
     Return what a moving start adds to the sum of costates times steps, with the opposite sign.
 
     Sum over i = 1 ... 5 of w^(i) times its costate (V2) of docs/derivation.md.
+
+    Parameters
+    ----------
+    cost
+        What is minimised.
+    start
+        Prescribed derivatives 0 to 5, shape (6,).
+    jet
+        Derivatives 0 to 10 of the law there, shape (11,) or more.
+
     """
     share = 0.0
-    for i in range(1, CONDITIONS):
-        if jet[i] != 0.0:
-            its_costate = sum(
-                (-1.0) ** m * cost.matrix[i + m] @ jet[1 + m : 1 + m + CONDITIONS]
-                for m in range(CONDITIONS - i)
-            )
-            share += its_costate * jet[i]
+    for i in np.flatnonzero(start[1:]).tolist():
+        its_costate = sum(
+            (-1.0) ** m * cost.matrix[i + 1 + m] @ jet[1 + m : 1 + m + CONDITIONS]
+            for m in range(CONDITIONS - 1 - i)
+        )
+        share += its_costate * start[i + 1]
     return float(share)

@@ -19,10 +19,10 @@ Nothing is certified here: slopes and curvatures guide the search for the cheape
 path is solved and certified like any other.
 """
 
-from functools import cached_property
+from functools import cached_property, partial
 
 from flat_planner_ros.core.arm import FloatArray, strict_arithmetic
-from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
+from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.cost import QuadraticCost
 from flat_planner_ros.core.motion_law.optimal_path import (
     PathConditions,
@@ -56,18 +56,13 @@ class PathCost:
         self._relaxations = path.relaxations
         with strict_arithmetic():
             self._solution = solved_path(cost, path)
-            bases, halves = self._solution.bases, self._solution.halves
-            powers = halves[:, None, None] ** -np.arange(float(SOLUTIONS))[:, None]
-            # Derivatives 0 to 11 of every solution in physical time, (p, 12, 12).
-            self._at_start = powers * np.array([basis.at_start for basis in bases])
-            self._at_middle = powers * np.array([basis.at_middle for basis in bases])
-            self._at_end = powers * np.array([basis.at_end for basis in bases])
+            self._at_start, self._at_middle, self._at_end = self._solution.places
             amplitudes = self._solution.amplitudes.values
             self._before = self._at_end[:-1] @ amplitudes[:-1]  # (p - 1, 12, m)
             # Constant along each segment: taken in its middle.
             costates = self._costate_rows @ amplitudes
             start = self._at_start[0] @ amplitudes[0]
-            moving = sum(share_of_start(cost, jet) for jet in start.T)
+            moving = sum(map(partial(share_of_start, cost), path.start, start.T))
             self.value = float(np.sum(costates[:, 0] * self._solution.steps.T) - moving)
             """Integral of Y^T Q Y over the motion, summed over the variables."""
             self._costate_jumps = np.diff(costates[:, 0], axis=0)  # (p - 1, m)

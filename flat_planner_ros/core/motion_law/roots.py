@@ -24,6 +24,7 @@ do not (docs/derivation.md, section 5).
 from cmath import sqrt
 from collections.abc import Iterable, Sequence
 from functools import cache, cached_property
+from math import inf
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
@@ -32,6 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
+
+APART = b''
+"""Grouping in which each root is a cluster of its own."""
 
 LINK = 2.5
 """Roots beta closer than this, in units of 2 / duration, share a cluster [-]."""
@@ -75,16 +79,15 @@ class Cluster(NamedTuple):
 
     def scaled(self, scale: float) -> 'Cluster':
         """Return the cluster with all roots multiplied by a factor."""
-        powers = scale ** np.arange(len(self.factor))
-        return Cluster(centre=scale * self.centre, factor=self.factor * powers)
+        return Cluster(scale * self.centre, self.factor * scale ** np.arange(len(self.factor)))
 
 
 class Spectrum:
     """
     Characteristic roots of an equation in one unit of time, clustered in any other.
 
-    In another unit all roots are multiples of themselves; only which of them are close together
-    depends on it. They are found once, and the clusters once for each grouping.
+    In another unit all roots are multiples of themselves; only which are close together depends
+    on it. They are found once, and the clusters once for each grouping.
 
     Parameters
     ----------
@@ -99,37 +102,34 @@ class Spectrum:
         self._reduced = coefficients[self._zeros :]
         self._squares = _companion_roots(self._reduced)
         self._alone = _polished_roots(self._reduced.tolist(), self._squares.tolist())
+        self._apart_beyond = inf if self._alone is None else _apart_beyond(self._alone)
         self._grouped: dict[bytes, list[Cluster]] = {}
 
-    def grouping(self, scale: float) -> bytes:
-        """Return what is the same for all factors with which the roots form the same clusters."""
-        return b'' if self._apart(scale) is not None else self._linked(scale).tobytes()
+    def groupings(self, scales: FloatArray) -> list[bytes]:
+        """Return what is the same for all factors, (s,), that make the same clusters of roots."""
+        keys = [APART] * len(scales)
+        close = np.flatnonzero(scales <= self._apart_beyond)
+        if len(close):
+            distances, bridged = self._distances
+            reach = np.maximum((LINK / scales[close])[:, None, None], bridged)
+            for i, linked in zip(close.tolist(), distances <= reach, strict=True):
+                keys[i] = linked.tobytes()
+        return keys
 
     def clusters(self, scale: float = 1.0) -> list[Cluster]:
         """Return the clusters of all roots multiplied by a positive factor."""
-        roots = self._apart(scale)
-        if roots is not None:
+        return self.grouped(self.groupings(np.array([scale]))[0], scale)
+
+    def grouped(self, key: bytes, scale: float) -> list[Cluster]:
+        """Return clusters of a grouping, of all roots multiplied by a positive factor."""
+        if key == APART:
             central = Cluster(centre=0j, factor=_monomial(2 * self._zeros))
-            others = (Cluster(centre=beta, factor=_monomial(1)) for beta in roots)
-            return [central, *others]
-        linked = self._linked(scale)
-        key = linked.tobytes()
+            return [central, *(Cluster(scale * b, _monomial(1)) for b in self._alone or ())]
         if key not in self._grouped:
+            linked = np.frombuffer(key, dtype=np.bool_).reshape(self._distances[0].shape)
             self._grouped[key] = self._of_groups(linked)
         found = self._grouped[key]
         return list(found) if scale == 1.0 else [cluster.scaled(scale) for cluster in found]
-
-    def _apart(self, scale: float) -> list[complex] | None:
-        """Return the roots multiplied by a factor, if each is a cluster of its own."""
-        if self._alone is None:
-            return None
-        roots = self._alone if scale == 1.0 else [scale * beta for beta in self._alone]
-        return roots if _are_apart(roots) else None
-
-    def _linked(self, scale: float) -> BoolArray:
-        """Tell which roots share a cluster, the mirror images included, shape (12, 12)."""
-        distances, bridged = self._distances
-        return np.asarray(distances <= np.maximum(LINK / scale, bridged))
 
     @cached_property
     def _beta(self) -> ComplexArray:
@@ -193,20 +193,22 @@ def _polished_roots(ascending: list[float], squares: list[complex]) -> list[comp
     return roots
 
 
-def _are_apart(roots: list[complex]) -> bool:
-    """Tell whether each root is a cluster of its own, far from zero and the imaginary axis."""
+def _apart_beyond(roots: list[complex]) -> float:
+    """Return the factor of roots beyond which each is a cluster of its own, infinite if none."""
+    least = 0.0
     for i, beta in enumerate(roots):
-        modulus = abs(beta)
         # Half the distance to its mirror image or its conjugate.
-        near = 0.5 * max(PAIR_LINK, PAIR_RELATIVE_LINK * modulus)
-        if modulus <= LINK or beta.real <= near or 0.0 < beta.imag <= near:
-            return False
+        near = min(beta.real, beta.imag or inf)
+        if near <= 0.5 * PAIR_RELATIVE_LINK * abs(beta):
+            return inf
+        least = max(least, LINK / abs(beta), 0.5 * PAIR_LINK / near)
         for other in roots[:i]:
             # The images of two roots are at least as far apart as they are in the quadrant.
-            reach = max(LINK, RELATIVE_LINK * min(beta.real, other.real))
-            if abs(beta - other) <= reach:
-                return False
-    return True
+            distance = abs(beta - other)
+            if distance <= RELATIVE_LINK * min(beta.real, other.real):
+                return inf
+            least = max(least, LINK / distance)
+    return least
 
 
 def _polished(ascending: list[float], z: complex) -> complex | None:
@@ -359,9 +361,8 @@ def _roots(factor: list[complex]) -> list[complex]:
     if len(factor) == 2:
         return [-factor[1]]
     ascending = np.array(factor[::-1])
-    real = ascending.real
-    found = _companion_roots(ascending) if ascending.imag.any() else _companion_roots(real)
-    roots: list[complex] = found.tolist()
+    is_real = not ascending.imag.any()
+    roots: list[complex] = _companion_roots(ascending.real if is_real else ascending).tolist()
     return roots
 
 
@@ -379,7 +380,7 @@ def _cluster(squares: Sequence[complex], is_imaginary: bool) -> Cluster | None:
     Raises
     ------
     ArithmeticError
-        The group has come to lie at zero: next to others, its roots are lost in double precision.
+        The group has come to lie at zero: its roots are lost in double precision.
 
     """
     if not _is_conjugate_closed(squares):

@@ -15,7 +15,8 @@
 """Motion laws against the same functions differentiated in multiple precision."""
 
 from flat_planner_ros.core.motion_law.law import ExponentialLaw
-from flat_planner_ros.core.motion_law.terms import Term, term_sum
+from flat_planner_ros.core.motion_law.term_sum import term_sum
+from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
 import pytest
 
