@@ -26,6 +26,7 @@ from flat_planner_ros.core.arm import (
 from flat_planner_ros.core.insensitive import Insensitivity, predict_residual, UncertaintyBox
 from flat_planner_ros.core.monitor import fit_oscillation, identify
 from flat_planner_ros.core.motion_law import Strategy
+from flat_planner_ros.core.plan_table import plan_many, PlanTable
 from flat_planner_ros.core.planning import (
     JointLimits,
     MotionRequest,
@@ -63,9 +64,11 @@ __all__ = [
     'NotFlat',
     'plan',
     'Plan',
+    'plan_many',
     'PlanarArm',
     'PlannerSession',
     'PlanningOptions',
+    'PlanTable',
     'predict_residual',
     'residual_of_plan',
     'suggest_counterbalances',

@@ -38,7 +38,14 @@ from flat_planner_ros.core.insensitive.oscillator import largest, Oscillator
 from flat_planner_ros.core.insensitive.residual import (
     predict_residual,
     PredictedResidual,
+    residual_amplitude,
     servo_effort,
+)
+from flat_planner_ros.core.insensitive.residual_table import (
+    misses,
+    OscillatorTable,
+    residual_table,
+    ResidualTable,
 )
 from flat_planner_ros.core.insensitive.shapers import shaped_quintic, Shaper
 
@@ -55,10 +62,15 @@ __all__ = [
     'MAX_HALF_WIDTH',
     'MAX_INSENSITIVITY',
     'MAX_PAYLOAD',
+    'misses',
     'Nominal',
     'Oscillator',
+    'OscillatorTable',
     'predict_residual',
     'PredictedResidual',
+    'residual_amplitude',
+    'residual_table',
+    'ResidualTable',
     'servo_effort',
     'shaped_quintic',
     'Shaper',

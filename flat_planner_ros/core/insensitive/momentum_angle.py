@@ -31,14 +31,13 @@ from flat_planner_ros.core.insensitive.oscillator import gauss_legendre, Oscilla
 from flat_planner_ros.core.insensitive.response import (
     BASES_KEPT,
     CONTACT,
-    integration,
     joining,
     Normalised,
     responses,
     TOP,
     top_derivatives,
 )
-from flat_planner_ros.core.motion_law import CONDITIONS
+from flat_planner_ros.core.motion_law import CONDITIONS, integration
 import numpy as np
 from numpy.polynomial import legendre
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
 from math import ceil
+from typing import TypeVar
 
 from flat_planner_ros.core.arm import (
     ComplexArray,
@@ -57,9 +58,10 @@ MEAN_NODES = 4
 MAX_MEAN_NODES = (24, 24, 8)
 """Most of them over stiffness, damping and inertia, which acts like both others together."""
 
-
 RULES_KEPT = 128
 """Quadratures, and points of an edge, that are remembered."""
+
+Value = TypeVar('Value', float, FloatArray)
 
 
 @lru_cache(maxsize=RULES_KEPT)
@@ -73,6 +75,95 @@ def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
 def _spread(count: int) -> FloatArray:
     """Return Chebyshev points from 0 to 1: extremes near ends are seen as well as those inside."""
     return locked(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count)))
+
+
+def stiffening(
+    drive: Drive, inertia_ratio: Value, inertia: FloatArray, inner: FloatArray | float = 1.0
+) -> FloatArray:
+    """
+    Return the factor on stiffness and damping that acts like factors on inertias.
+
+    Parameters
+    ----------
+    drive
+        What moves joint n-1.
+    inertia_ratio
+        I*_(n-1) / I*_n [-].
+    inertia, inner
+        Factors on the inertia of link n and on that of link n-1 without it [-].
+
+    """
+    if drive is Drive.POSITION:
+        return 1.0 / inertia
+    # Rotors n-1 and n in series.
+    factor: FloatArray = (1.0 / inner + (inertia_ratio - 1.0) / inertia) / inertia_ratio
+    return factor
+
+
+def pole_parts(
+    frequency: Value, decay: Value, stiffness: FloatArray, damping: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rate of decay and the square of the damped frequency under factors [-]."""
+    rate: FloatArray = damping * decay
+    return rate, stiffness * frequency**2 - rate**2
+
+
+def corners_of(box: UncertaintyBox) -> FloatArray:
+    """Return factors at the corners of the region of poles of a box, in order, shape (6, 3)."""
+    k, c, i = box.ranges
+    # Poles depend on (k, c) times what falls with i: rectangles that grow from one corner's
+    # ray to the other's, a hexagon in all.
+    return np.array(
+        [
+            [k.low, c.low, i.high],
+            [k.high, c.low, i.high],
+            [k.high, c.low, i.low],
+            [k.high, c.high, i.low],
+            [k.low, c.high, i.low],
+            [k.low, c.high, i.high],
+        ]
+    )
+
+
+def edges_between(
+    corners: FloatArray, turns: FloatArray, most: int = MAX_POINTS
+) -> list[FloatArray]:
+    """
+    Return factors along the edges between corners.
+
+    Parameters
+    ----------
+    corners
+        Factors, in order, shape (6, 3) [-].
+    turns
+        How far oscillations drift apart from each corner to the following one, shape (6,) [rad].
+    most
+        Largest number of points of an edge.
+
+    Returns
+    -------
+    list[FloatArray]
+        As by `Oscillator.edges`.
+
+    """
+    ends = np.roll(corners, -1, axis=0)
+    counts = [
+        min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most) if is_long else 0
+        for turn, is_long in zip(turns.tolist(), (corners != ends).any(axis=1), strict=True)
+    ]
+    if not any(counts):
+        return [corners[:1]]
+    # All edges at once, as they have few points each.
+    share = np.concatenate([_spread(count) for count in counts])
+    begin, end = np.repeat(corners, counts, axis=0), np.repeat(ends, counts, axis=0)
+    factors = begin + share[:, None] * (end - begin)
+    # Frequencies go with the root of 1 / inertia, over which points are spread evenly.
+    begin, end = 1.0 / begin[:, 2], 1.0 / end[:, 2]
+    factors[:, 2] = 1.0 / (begin + share * (end - begin))
+    lasts = accumulate(counts)
+    return [
+        factors[last - count : last] for last, count in zip(lasts, counts, strict=True) if count
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,10 +219,7 @@ class Oscillator:
 
     def stiffening(self, inertia: FloatArray) -> FloatArray:
         """Return the factor on stiffness and damping that acts like one on I*_n, shape (m,)."""
-        if self.drive is Drive.POSITION:
-            return 1.0 / inertia
-        # Rotors n-1, whose own inertia stays, and n in series.
-        return (1.0 + (self.inertia_ratio - 1.0) / inertia) / self.inertia_ratio
+        return stiffening(self.drive, self.inertia_ratio, inertia)
 
     def poles(self, factors: FloatArray) -> ComplexArray:
         """
@@ -150,8 +238,9 @@ class Oscillator:
 
         """
         common = self.stiffening(factors[:, 2]) if factors.shape[1] > 2 else 1.0
-        decay = factors[:, 1] * common * self.decay
-        square = factors[:, 0] * common * self.frequency**2 - decay**2
+        decay, square = pole_parts(
+            self.frequency, self.decay, factors[:, 0] * common, factors[:, 1] * common
+        )
         if (square <= 0.0).any():
             k, c = factors[int(np.argmin(square))][:2]
             raise InvalidRequest(
@@ -183,42 +272,9 @@ class Oscillator:
             link, each of shape (m, 3) [-]; edges of no length are left out.
 
         """
-        k, c, i = box.ranges
-        # Poles depend on (k, c) times what falls with i: rectangles that grow from one corner's
-        # ray to the other's, a hexagon in all.
-        corners = np.array(
-            [
-                [k.low, c.low, i.high],
-                [k.high, c.low, i.high],
-                [k.high, c.low, i.low],
-                [k.high, c.high, i.low],
-                [k.low, c.high, i.low],
-                [k.low, c.high, i.high],
-            ]
-        )
-        following = [1, 2, 3, 4, 5, 0]
-        ends = corners[following]
+        corners = corners_of(box)
         poles = self.poles(corners)
-        turns = duration * np.abs(poles[following] - poles)
-        counts = [
-            min(max(ceil(turn / TURN_PER_POINT) + 1, MIN_POINTS), most) if is_long else 0
-            for turn, is_long in zip(turns.tolist(), (corners != ends).any(axis=1), strict=True)
-        ]
-        if not any(counts):
-            return [corners[:1]]
-        # All edges at once, as they have few points each.
-        share = np.concatenate([_spread(count) for count in counts])
-        begin, end = np.repeat(corners, counts, axis=0), np.repeat(ends, counts, axis=0)
-        factors = begin + share[:, None] * (end - begin)
-        # Frequencies go with the root of 1 / inertia, over which points are spread evenly.
-        begin, end = 1.0 / begin[:, 2], 1.0 / end[:, 2]
-        factors[:, 2] = 1.0 / (begin + share * (end - begin))
-        lasts = accumulate(counts)
-        return [
-            factors[last - count : last]
-            for last, count in zip(lasts, counts, strict=True)
-            if count
-        ]
+        return edges_between(corners, duration * np.abs(np.roll(poles, -1) - poles), most)
 
     def nodes(self, box: UncertaintyBox, duration: float) -> tuple[FloatArray, FloatArray]:
         """Return points inside a box, shape (p, 3), and weights of a mean over it, shape (p,)."""

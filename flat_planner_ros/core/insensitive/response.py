@@ -26,7 +26,12 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, locked
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
-from flat_planner_ros.core.motion_law import JET_ORDER, ScaledLaw
+from flat_planner_ros.core.motion_law import (
+    differentiation,
+    integration,
+    JET_ORDER,
+    ScaledLaw,
+)
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -83,29 +88,6 @@ class Normalised(NamedTuple):
     def is_split(self, terms: int) -> bool:
         """Whether the natural oscillation is too fast for so many terms of sigma^(4)."""
         return bool(self.epsilon**-0.5 > SPLIT_TURN * terms)
-
-
-@lru_cache(maxsize=BASES_KEPT)
-def integration(size: int) -> FloatArray:
-    """Return the matrix of the integral from -1 on Legendre coefficients, the last one cut."""
-    matrix = np.zeros((size, size))
-    matrix[0, 0] = 1.0
-    for k in range(size):
-        if k + 1 < size:
-            matrix[k + 1, k] = 1.0 / (2 * k + 1)
-        if k > 0:
-            matrix[k - 1, k] = -1.0 / (2 * k + 1)
-    return locked(matrix)
-
-
-@lru_cache(maxsize=BASES_KEPT)
-def differentiation(size: int) -> FloatArray:
-    """Return the matrix of the derivative on Legendre coefficients."""
-    # P_k' = (2 k - 1) P_(k-1) + (2 k - 5) P_(k-3) + ...
-    below, order = np.indices((size, size))
-    is_part = (order > below) & ((order - below) % 2 == 1)
-    matrix = np.where(is_part, 2.0 * below + 1.0, 0.0)
-    return locked(matrix)
 
 
 @cache

@@ -24,6 +24,7 @@ from flat_planner_ros.core.motion_law.extremal import (
     BoundaryConditions,
     costate,
     extremals,
+    Mean,
     probes,
     stationarity_residual,
     unit_motion,
@@ -37,18 +38,23 @@ from flat_planner_ros.core.motion_law.law import (
     motion_quadrature,
     ScaledLaw,
 )
+from flat_planner_ros.core.motion_law.legendre_series import differentiation, integration
 from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 from flat_planner_ros.core.motion_law.path_cost import PathCost
+from flat_planner_ros.core.motion_law.unit_table import unit_table, UnitGroup, UnitMotions
 
 __all__ = [
     'BoundaryConditions',
     'CONDITIONS',
     'costate',
+    'differentiation',
     'ExponentialLaw',
     'extremals',
+    'integration',
     'JET_ORDER',
     'Law',
     'MAX_DERIVATIVE',
+    'Mean',
     'motion_quadrature',
     'optimal_path',
     'PathCost',
@@ -61,4 +67,7 @@ __all__ = [
     'strategy_cost',
     'unit_motion',
     'UnitMotion',
+    'unit_table',
+    'UnitGroup',
+    'UnitMotions',
 ]

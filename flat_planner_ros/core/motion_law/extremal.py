@@ -70,7 +70,8 @@ UNITS_KEPT = 64
 
 _ORDERS = np.arange(CONDITIONS + 1.0)
 
-_UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
+UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
+"""Derivatives 0 to 5 of a unit motion at its ends, shape (6, 2) [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -341,7 +342,7 @@ def kept_units(key: bytes) -> list[UnitMotion]:
 
 def unit_terms(coefficients: FloatArray) -> tuple[Term, ...]:
     """Return the terms of the stationary law from rest at -1/2 to rest at 1/2; it is odd."""
-    return tuple(_BoundarySolver(Spectrum(coefficients).clusters(), -1.0).terms(_UNIT_ENDS[:, 1]))
+    return tuple(_BoundarySolver(Spectrum(coefficients).clusters(), -1.0).terms(UNIT_ENDS[:, 1]))
 
 
 def _certified(coefficients: FloatArray) -> UnitMotion:
@@ -350,9 +351,9 @@ def _certified(coefficients: FloatArray) -> UnitMotion:
     jet = law.normalised_jet(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     # Relative to the start, as the value's own peak is the distance.
-    sizes = peaks[:CONDITIONS] + _UNIT_ENDS[:, 1]
+    sizes = peaks[:CONDITIONS] + UNIT_ENDS[:, 1]
     last = jet.shape[1] - 1
-    miss = np.abs(jet[:CONDITIONS, ::last] - _UNIT_ENDS) / sizes[:, None]  # first and last
+    miss = np.abs(jet[:CONDITIONS, ::last] - UNIT_ENDS) / sizes[:, None]  # first and last
     return UnitMotion(
         coefficients=coefficients,
         law=law,

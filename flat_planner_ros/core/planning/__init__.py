@@ -15,7 +15,12 @@
 """Planning: from what is asked to a certified plan within the limits."""
 
 from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
-from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
+from flat_planner_ros.core.planning.certified_plan import (
+    BOUNDARY_TOLERANCE,
+    OPTIMALITY_TOLERANCE,
+    Plan,
+    PlanSamples,
+)
 from flat_planner_ros.core.planning.cost_weights import (
     DEFAULT_EFFORT_WEIGHT,
     DEFAULT_ENERGY_WEIGHT,
@@ -25,7 +30,8 @@ from flat_planner_ros.core.planning.cost_weights import (
 from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
-from flat_planner_ros.core.planning.planner import plan
+from flat_planner_ros.core.planning.planner import NO_DISTANCE, plan
+from flat_planner_ros.core.planning.reference_trajectory import joint_rows, MAX_NUMBER
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,
@@ -55,6 +61,7 @@ __all__ = [
     'CONDITIONS',
     'Strategy',
     'baselines',
+    'BOUNDARY_TOLERANCE',
     'check_options',
     'DEFAULT_EFFORT_WEIGHT',
     'DEFAULT_ENERGY_WEIGHT',
@@ -65,13 +72,17 @@ __all__ = [
     'FASTEST_INSENSITIVE',
     'fastest_points',
     'FASTEST_WITHIN',
+    'joint_rows',
     'JointLimits',
     'LimitUse',
+    'MAX_NUMBER',
     'MAX_RELATIVE_WEIGHT',
     'MAX_WEIGHT',
     'MotionRequest',
+    'NO_DISTANCE',
     'NoFeasibleDuration',
     'OnViolation',
+    'OPTIMALITY_TOLERANCE',
     'OWN_LAWS',
     'Plan',
     'plan',

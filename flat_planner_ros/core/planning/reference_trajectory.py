@@ -103,14 +103,7 @@ class MotionProblem:
     @cached_property
     def rows(self) -> FloatArray:
         """Torque and velocities of the last two joints from the unit motion's jet, (3, 7)."""
-        mapping = self.flat_map
-        rows = np.zeros((3, JET_ORDER + 1))
-        rows[0, : len(mapping.effort)] = mapping.effort
-        rows[1, 1 : len(mapping.output) + 1] = mapping.output
-        rows[2, 1 : len(mapping.deflection) + 1] = mapping.deflection
-        rows[1] -= rows[2]
-        rows *= self.rates
-        return rows
+        return joint_rows(self.flat_map) * self.rates
 
     def grid(self, intervals: int) -> FloatArray:
         """Return derivatives 0 to 6 and driving effort at even times, read-only, shape (8, m)."""
@@ -125,6 +118,24 @@ class MotionProblem:
             np.multiply(_kept_grid(self, intervals), distance, out=table)
         else:
             _fill(self, table, distance)
+
+
+def joint_rows(mapping: FlatMap) -> FloatArray:
+    """
+    Return effort of joint n-1, velocity of link n-1 and of joint n from the planned variable.
+
+    Returns
+    -------
+    FloatArray
+        Factors of its derivatives 0 to 6, shape (3, 7) [N m s^k / rad] and [s^(k - 1)].
+
+    """
+    rows = np.zeros((3, JET_ORDER + 1))
+    rows[0, : len(mapping.effort)] = mapping.effort
+    rows[1, 1 : len(mapping.output) + 1] = mapping.output
+    rows[2, 1 : len(mapping.deflection) + 1] = mapping.deflection
+    rows[1] -= rows[2]
+    return rows
 
 
 @lru_cache(maxsize=PROBLEMS_KEPT)

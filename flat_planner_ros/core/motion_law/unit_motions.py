@@ -1,0 +1,260 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What unit motions of many equations have in common, however their laws are written down.
+
+They are certified as `unit_motion` certifies each by itself, and their answer to an oscillation is
+an integral over their velocity, which is smooth at both ends.
+"""
+
+from dataclasses import dataclass, fields
+from math import comb
+
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
+from flat_planner_ros.core.motion_law.extremal import SAME, UNIT_ENDS
+from flat_planner_ros.core.motion_law.law import JET_ORDER
+import numpy as np
+from numpy.typing import NDArray
+
+IntArray = NDArray[np.int64]
+"""Indices."""
+
+FAR_POLE = 6.0
+"""Oscillation from which the integral by parts has terms that do not cancel [-]."""
+
+FASTER_POLE = 2.0
+"""The same relative to the fastest root of the law [-]."""
+
+FEWEST_INTERVALS = 16
+"""Fewest parts of half a motion in a trapezoidal sum."""
+
+EULER_MACLAURIN = (1.0 / 30240.0, -1.0 / 1209600.0, 1.0 / 47900160.0)
+"""B_2k / (2 k)! for k = 3, 4, 5: the ends' share of a trapezoidal sum."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Certificates:
+    """
+    Quality, cost and ends of unit motions in normalised time.
+
+    Attributes
+    ----------
+    coefficients
+        a_0 ... a_6 of their equations, shape (p, 7).
+    boundary_residual, optimality_residual
+        (31) and (32) of docs/derivation.md, shape (p,).
+    costate
+        (33) of docs/derivation.md, here also the cost, shape (p,).
+    peaks
+        Largest magnitudes of the derivatives 0 to 6 at the times of the certificate, (p, 7).
+    ends
+        Derivatives 6 to 11 at the end, shape (p, 6).
+
+    """
+
+    coefficients: FloatArray
+    boundary_residual: FloatArray
+    optimality_residual: FloatArray
+    costate: FloatArray
+    peaks: FloatArray
+    ends: FloatArray
+
+    @classmethod
+    def of(cls, coefficients: FloatArray, jets: FloatArray) -> 'Certificates':
+        """
+        Return what derivatives tell of unit motions.
+
+        Parameters
+        ----------
+        coefficients
+            Of their equations, shape (p, 7).
+        jets
+            Derivatives 0 to 12 at `probes`, shape (p, 13, m).
+
+        """
+        peaks = np.abs(jets[:, : JET_ORDER + 1]).max(axis=2)
+        # Relative to the start, as the value's own peak is the distance.
+        sizes = peaks[:, :CONDITIONS] + UNIT_ENDS[:, 1]
+        miss = np.abs(jets[:, :CONDITIONS, [0, -1]] - UNIT_ENDS) / sizes[..., None]
+        even = jets[:, 2::2]
+        factors = coefficients[:, None, 1:]
+        terms = (np.abs(factors) @ np.abs(even)).max(axis=(1, 2))
+        # Of the polynomial law no term is left at all.
+        stationarity = np.abs(factors @ even).max(axis=(1, 2)) / np.where(terms > 0.0, terms, 1.0)
+        return cls(
+            coefficients=coefficients,
+            boundary_residual=miss.max(axis=(1, 2)),
+            optimality_residual=stationarity + SAME,
+            costate=-np.einsum('pk,pk->p', coefficients[:, 1:], jets[:, 1:SOLUTIONS:2, -2]),
+            peaks=peaks,
+            ends=jets[:, CONDITIONS:SOLUTIONS, -1].copy(),
+        )
+
+    def chosen(self, rows: IntArray) -> 'Certificates':
+        """Return those of some motions."""
+        return Certificates(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+
+
+def speeds(coefficients: FloatArray) -> FloatArray:
+    """
+    Return how fast the solutions of equations are, in units of 2 / duration.
+
+    Parameters
+    ----------
+    coefficients
+        a_0 ... a_6 of each, a_6 = 1, shape (p, 7).
+
+    Returns
+    -------
+    FloatArray
+        No root is larger than 2^(1/2) times this (Fujiwara's bound in z = beta^2), shape (p,) [-].
+
+    """
+    exponents = 1.0 / (SOLUTIONS - 2.0 * np.arange(CONDITIONS))
+    largest: FloatArray = (np.abs(coefficients[:, :CONDITIONS]) ** exponents).max(axis=1)
+    return largest
+
+
+def transform_intervals(coefficients: FloatArray, poles: ComplexArray) -> IntArray:
+    """
+    Return into how many parts the trapezoidal sum of a transform divides half a motion.
+
+    Parameters
+    ----------
+    coefficients
+        Of the equations, shape (p, 7).
+    poles
+        z, shape (p, q) [-].
+
+    Returns
+    -------
+    IntArray
+        Powers of two, 0 where the integral by parts is exact for all poles, shape (p,).
+
+    """
+    sizes, fastest = np.abs(poles), speeds(coefficients)
+    rates = fastest + sizes.max(axis=1)
+    parts = 2 ** np.ceil(np.log2(np.maximum(rates, FEWEST_INTERVALS))).astype(np.int64)
+    is_far = sizes.min(axis=1) >= np.maximum(FAR_POLE, FASTER_POLE * fastest)
+    return np.where(is_far, 0, parts)
+
+
+def by_parts(certificates: Certificates, poles: ComplexArray) -> ComplexArray:
+    """
+    Return the integral of w' exp(z (1 - x)) over motions, twelve times by parts.
+
+    What is left of the integral then is a multiple of itself, by the Euler-Lagrange equation.
+
+    Parameters
+    ----------
+    certificates
+        Of the motions, p of them.
+    poles
+        z, larger than the roots of the equations, shape (p, q) [-].
+
+    References
+    ----------
+    (44a) of docs/derivation.md.
+
+    """
+    inverse = 1.0 / poles
+    square = inverse**2
+    start = np.exp(2.0 * poles)
+    a = certificates.coefficients
+    # sum_k a_k z^(2k - 12), from the lowest that meets a boundary term on.
+    sums = [np.ones_like(poles)]
+    power = np.ones_like(poles)
+    for k in range(CONDITIONS - 1, 0, -1):
+        power = power * square
+        sums.append(sums[-1] + a[:, k : k + 1] * power)
+    total = np.zeros_like(poles)
+    power = inverse**CONDITIONS
+    for index in range(CONDITIONS):
+        order = CONDITIONS + index
+        left = certificates.ends[:, index : index + 1] * (1.0 + (-1.0) ** order * start)
+        total -= left * power * sums[(SOLUTIONS - 1 - order) // 2]
+        power = power * inverse
+    result: ComplexArray = total / sums[-1]
+    return result
+
+
+def trapezoid(
+    velocities: FloatArray, certificates: Certificates, poles: ComplexArray
+) -> ComplexArray:
+    """
+    Return the integral of w' exp(z (1 - x)) over motions as a trapezoidal sum.
+
+    Parameters
+    ----------
+    velocities
+        w' at even x from 0 to 1, which is even in x, shape (p, m).
+    certificates
+        Of the motions, p of them.
+    poles
+        z, shape (p, q) [-].
+
+    References
+    ----------
+    Euler-Maclaurin formula: w' begins and ends with w^(6), what lower derivatives would add is
+    zero.
+
+    """
+    step = 1.0 / (velocities.shape[1] - 1)
+    # sum_j w'_j cosh(j z h) by Clenshaw's recurrence.
+    cosh = np.cosh(step * poles)
+    double = 2.0 * cosh
+    current, last = np.zeros_like(poles), np.zeros_like(poles)
+    for column in velocities.T[:0:-1]:
+        np.subtract(double * current, last, out=last)
+        last += column[:, None]
+        current, last = last, current
+    inner = velocities[:, :1] + 2.0 * (cosh * current - last)
+    result: ComplexArray = step * np.exp(poles) * inner
+    start = np.exp(2.0 * poles)
+    for k, factor in enumerate(EULER_MACLAURIN, start=CONDITIONS // 2):
+        for j in range(2 * k - CONDITIONS + 1):
+            order = 2 * k - j
+            end = certificates.ends[:, order - CONDITIONS, None]
+            left = comb(2 * k - 1, j) * (-poles) ** j * end * (1.0 + (-1.0) ** order * start)
+            result -= factor * step ** (2 * k) * left
+    return result
+
+
+def mirrored_grid(
+    odd: FloatArray, even: FloatArray, rows: FloatArray, certificates: Certificates, intervals: int
+) -> FloatArray:
+    """
+    Return combinations of derivatives at even times, the ends as exact as they are certified.
+
+    Parameters
+    ----------
+    odd, even
+        Their odd and even parts at the first half of the times, shape (p, m, half).
+    rows
+        Factors of the derivatives 0 to 6, shape (p, m, 7).
+    certificates
+        Of the motions, p of them.
+    intervals
+        Parts of the motion.
+
+    """
+    half = odd.shape[2]
+    table = np.empty((*odd.shape[:2], intervals + 1))
+    np.subtract(even, odd, out=table[..., ::-1][..., :half])
+    np.add(odd, even, out=table[..., :half])
+    end = 0.5 * rows[..., 0] + rows[..., JET_ORDER] * certificates.ends[:, :1]
+    table[..., 0], table[..., -1] = -end, end
+    return table

@@ -1,0 +1,275 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Unit motions of many equations at once, as Legendre series.
+
+The sixth derivative of a law from rest to rest lacks the polynomials below the sixth, but for
+those of the law of least degree; sixfold integrals of all others vanish at both ends, with five
+derivatives. In this basis the Euler-Lagrange equation is one small linear system, well conditioned
+whatever its roots have in common ((30a) of docs/derivation.md). Roots that are too fast for the
+terms do not pass the certificate, and are left to exponentials.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
+from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
+from flat_planner_ros.core.motion_law.extremal import Mean, probes
+from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER
+from flat_planner_ros.core.motion_law.legendre_series import (
+    differentiation,
+    integration,
+    legendre_values,
+)
+from flat_planner_ros.core.motion_law.unit_motions import (
+    by_parts,
+    Certificates,
+    IntArray,
+    mirrored_grid,
+    transform_intervals,
+    trapezoid,
+)
+import numpy as np
+
+FASTEST = {16: 10.0, 24: 20.0, 32: 28.0, 40: 40.0}
+"""Fastest root in units of 2 / duration for each number of odd terms of w^(12) [-]."""
+
+TABLES_KEPT = 32
+"""Tables of basis functions at certain places that are remembered."""
+
+
+class _Basis(NamedTuple):
+    """
+    Laws of unit distance: the one of least degree, plus any combination of changes.
+
+    Attributes
+    ----------
+    derivatives
+        Legendre coefficients of the derivatives 0 to 12 of each change and, last, of the law of
+        least degree, shape (13, size, terms + 1).
+    equation
+        Odd coefficients, as many as there are terms, of the even derivatives 0, 2, ..., 12, shape
+        (7, terms, terms + 1).
+
+    """
+
+    derivatives: FloatArray
+    equation: FloatArray
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _basis(terms: int) -> _Basis:
+    """Return the basis whose changes have an odd Legendre polynomial each as w^(12)."""
+    size = 2 * terms + SOLUTIONS
+    once, slope = integration(size), differentiation(size)
+    table = np.zeros((SOLUTIONS + 1, size, terms + 1))
+    table[SOLUTIONS, 1 : 2 * terms : 2, :terms] = np.eye(terms)
+    for order in range(SOLUTIONS - 1, CONDITIONS - 1, -1):
+        table[order] = once @ table[order + 1]
+        if order % 2 == 0:
+            table[order, 0] = 0.0  # odd about the middle, wherever the integral began
+    # Only without these polynomials do the next six integrals vanish at both ends.
+    low = np.zeros((size, terms + 1))
+    low[:CONDITIONS] = table[CONDITIONS, :CONDITIONS]
+    for order in range(CONDITIONS, SOLUTIONS):
+        table[order] -= low
+        low = slope @ low
+    for order in range(CONDITIONS - 1, -1, -1):
+        table[order] = once @ table[order + 1]
+        table[order, order % 2 :: 2] = 0.0
+    table[..., terms] = _least_degree(size)
+    return _Basis(locked(table), locked(table[::2, 1 : 2 * terms : 2].copy()))
+
+
+def _least_degree(size: int) -> FloatArray:
+    """Return Legendre coefficients of the polynomial law and its derivatives, (13, size)."""
+    power = np.polynomial.polynomial.polypow([1.0, 0.0, -1.0], CONDITIONS - 1)
+    speed = np.polynomial.legendre.poly2leg(power)
+    table = np.zeros((SOLUTIONS + 1, size))
+    table[1, : len(speed)] = speed / (2.0 * speed[0])
+    for order in range(2, SOLUTIONS + 1):
+        table[order] = differentiation(size) @ table[order - 1]
+    table[0] = integration(size) @ table[1]
+    table[0, 0] = 0.0  # from -1/2
+    return table
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _halves(terms: int) -> tuple[FloatArray, FloatArray]:
+    """Return derivatives 0, 2, 4, 6 and 1, 3, 5 of the basis, (terms + 1, orders size / 2)."""
+    derivatives = _basis(terms).derivatives[: JET_ORDER + 1]
+    # Those of even order are odd about the middle.
+    odd, even = derivatives[::2, 1::2], derivatives[1::2, ::2]
+    return _in_columns(odd), _in_columns(even)
+
+
+def _in_columns(part: FloatArray) -> FloatArray:
+    """Return a table whose last axis is the basis with this axis first and one other."""
+    return locked(part.reshape(-1, part.shape[-1]).T.copy())
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _at_probes(terms: int) -> FloatArray:
+    """Return derivatives 0 to 12 of the basis at the times of the certificate."""
+    after_start, before_end = probes()
+    places = np.where(after_start < 1.0, after_start - 1.0, 1.0 - before_end)
+    derivatives = _basis(terms).derivatives
+    values = legendre_values(places, derivatives.shape[1])
+    table = np.einsum('kst,sm->tkm', derivatives, values)
+    return locked(table.reshape(terms + 1, -1))
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _at_nodes(terms: int) -> tuple[FloatArray, FloatArray]:
+    """Return odd and even Legendre polynomials where peaks are looked for, (size / 2, m)."""
+    times, _ = half_quadrature(np.array([complex(FASTEST[terms])]))
+    return _parities(times - 1.0, 2 * terms + SOLUTIONS)
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _on_grid(terms: int, intervals: int) -> tuple[FloatArray, FloatArray]:
+    """Return the same at the first half of even times, the middle included."""
+    places = 2.0 * np.arange(intervals // 2 + 1.0) / intervals - 1.0
+    return _parities(places, 2 * terms + SOLUTIONS)
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _velocities(terms: int, intervals: int) -> FloatArray:
+    """Return w' of the basis at x = 0, h, ..., 1, shape (terms + 1, intervals + 1)."""
+    values = legendre_values(np.linspace(0.0, 1.0, intervals + 1), 2 * terms + SOLUTIONS)
+    return locked(_basis(terms).derivatives[1].T @ values)
+
+
+def _parities(places: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
+    """Return odd and even Legendre polynomials at some places."""
+    values = legendre_values(places, size)
+    return locked(values[1::2].copy()), locked(values[::2].copy())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnitSeries:
+    """
+    Unit motions with equally many terms, as `unit_motion` finds them one by one.
+
+    Attributes
+    ----------
+    amplitudes
+        Of the changes and, last, of the law of least degree, which is 1, shape (p, terms + 1).
+    certificates
+        Their quality, cost and ends.
+
+    """
+
+    amplitudes: FloatArray
+    certificates: Certificates
+
+    @classmethod
+    def of(cls, coefficients: FloatArray, terms: int) -> 'UnitSeries':
+        """
+        Return the unit motions of equations.
+
+        Parameters
+        ----------
+        coefficients
+            a_0 ... a_6 in normalised time, shape (p, 7) [-].
+        terms
+            How many terms a law has, one of `FASTEST`.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            An equation is singular in double precision.
+
+        """
+        system = np.einsum('pk,kij->pij', coefficients, _basis(terms).equation)
+        changes = np.linalg.solve(system[..., :terms], -system[..., terms:])[..., 0]
+        amplitudes = np.concatenate([changes, np.ones((len(changes), 1))], axis=1)
+        jets = (amplitudes @ _at_probes(terms)).reshape(len(changes), SOLUTIONS + 1, -1)
+        return cls(amplitudes=amplitudes, certificates=Certificates.of(coefficients, jets))
+
+    @property
+    def terms(self) -> int:
+        """Return the number of terms of each motion, without the law of least degree."""
+        return int(self.amplitudes.shape[1]) - 1
+
+    def chosen(self, rows: IntArray) -> 'UnitSeries':
+        """Return some of the motions."""
+        return UnitSeries(
+            amplitudes=self.amplitudes[rows], certificates=self.certificates.chosen(rows)
+        )
+
+    def means(self, rows: FloatArray) -> Mean:
+        """Return mean squares and peaks, as `UnitMotion.mean`, rows of shape (p, m, 7)."""
+        odd, even = self._combined(rows)
+        at_odd, at_even = _at_nodes(self.terms)
+        degrees = np.arange(float(2 * odd.shape[2]))
+        square = odd**2 @ (1.0 / (2.0 * degrees[1::2] + 1.0))
+        square += even**2 @ (1.0 / (2.0 * degrees[::2] + 1.0))
+        return Mean(square, (np.abs(odd @ at_odd) + np.abs(even @ at_even)).max(axis=2))
+
+    def on_even_grid(self, rows: FloatArray, intervals: int) -> FloatArray:
+        """
+        Return combinations of derivatives at even times, both ends included.
+
+        Parameters
+        ----------
+        rows
+            Factors of the derivatives 0 to 6, shape (p, m, 7).
+        intervals
+            Parts of the motion.
+
+        Returns
+        -------
+        FloatArray
+            Shape (p, m, intervals + 1).
+
+        """
+        odd, even = self._combined(rows)
+        at_odd, at_even = _on_grid(self.terms, intervals)
+        return mirrored_grid(odd @ at_odd, even @ at_even, rows, self.certificates, intervals)
+
+    def transform(self, poles: ComplexArray) -> ComplexArray:
+        """
+        Return the integral of w' exp(z (1 - x)) over the motion for each z.
+
+        Parameters
+        ----------
+        poles
+            z, none with a positive real part, shape (p, q) [-].
+
+        """
+        result = np.empty(poles.shape, dtype=complex)
+        parts = transform_intervals(self.certificates.coefficients, poles)
+        for intervals in np.unique(parts).tolist():
+            rows = np.flatnonzero(parts == intervals)
+            ends, chosen = self.certificates.chosen(rows), poles[rows]
+            if intervals == 0:
+                result[rows] = by_parts(ends, chosen)
+            else:
+                velocities = self.amplitudes[rows] @ _velocities(self.terms, intervals)
+                result[rows] = trapezoid(velocities, ends, chosen)
+        return result
+
+    def _combined(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return odd and even Legendre coefficients of combinations, each (p, m, size / 2)."""
+        parts = []
+        for parity, table in enumerate(_halves(self.terms)):
+            orders = rows[..., parity::2]
+            coefficients = self.amplitudes @ table
+            parts.append(orders @ coefficients.reshape(len(rows), orders.shape[2], -1))
+        odd, even = parts
+        return odd, even
