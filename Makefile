@@ -4,8 +4,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
 
+# Whose wheels are installed without ROS: jazzy or kilted.
+DISTRO ?= jazzy
+
 # What is installed without ROS, pinned and hashed; "make LOCK=" takes the ranges of setup.py instead.
-LOCK ?= requirements.lock
+LOCK ?= requirements$(if $(filter-out jazzy,$(DISTRO)),-$(DISTRO)).lock
 TEST_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-test.lock))
 DOCS_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-docs.lock))
 COMPILE = $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header --no-annotate \
@@ -14,20 +17,20 @@ PIP = $(BIN)/python -m pip install --quiet --progress-bar off
 SETUPTOOLS := 'setuptools>=70.1,<80'
 comma := ,
 
-# With ROS sourced, its rclpy is used; otherwise the extra "jazzy" brings the client library.
+# With ROS sourced, its rclpy is used; otherwise an extra, DISTRO, brings the client library.
 ROS := $(if $(ROS_DISTRO),$(shell python3 -c 'import rclpy' 2>/dev/null && echo $(ROS_DISTRO)))
 
 IS_SUITABLE := import ensurepip, sys, venv; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))
 CANDIDATES := $(if $(ROS),python3,python3 python3.12 python3.11 python3.13 python3.10)
 
-# What mypy finds depends on the types that NumPy brings; the code is checked with those of 2.4 and 2.5.
-HAS_TYPES := import numpy, sys; sys.exit(numpy.__version__[:4] not in ("2.4.", "2.5."))
+# What mypy finds depends on the types that NumPy and rclpy bring; checked with those of 2.4, 2.5 and Jazzy.
+HAS_TYPES := import numpy, sys; sys.exit(numpy.__version__[:4] not in ("2.4.", "2.5.") or "$(DISTRO)" != "jazzy")
 
 # pytest may be the system's, without a script in VENV; "-m" would put the checkout on the path.
 PYTEST := import sys; sys.path[:] = filter(None, sys.path); import pytest; sys.exit(pytest.main())
 
 # VENV belongs to one Python and one kind of ROS; another one makes it anew.
-MADE := $(VENV)/made-for-$(if $(PYTHON),$(subst /,_,$(PYTHON))-)$(or $(ROS),wheels)
+MADE := $(VENV)/made-for-$(if $(PYTHON),$(subst /,_,$(PYTHON))-)$(or $(ROS),$(DISTRO)-wheels)
 DEPENDENCIES := $(VENV)/dependencies-installed
 PACKAGE := $(VENV)/package-installed
 TESTING := $(VENV)/testing-installed
@@ -44,7 +47,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
-	@echo 'ARGS="..." is added to the command line of demo, test, fuzz, soak and bench; PYTHON=... chooses the interpreter.'
+	@echo 'ARGS="..." is added to the command line of demo, test, fuzz, soak and bench; PYTHON=... chooses the interpreter,'
+	@echo 'DISTRO=kilted the next ROS where none is installed.'
 
 demo: install  ## the paper's experiment on the three nodes: table, figures and numbers in build/
 	@mkdir -p build
@@ -85,7 +89,7 @@ lint: install $(TESTING)  ## ruff and mypy only
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
 	@if $(BIN)/python -c '$(HAS_TYPES)'; then set -x; $(BIN)/python -m mypy; \
-	else echo 'mypy is left out: it is run with the types of NumPy 2.4 and 2.5 only'; fi
+	else echo 'mypy is left out: it is run with the types of NumPy 2.4 and 2.5 and of Jazzy only'; fi
 
 install: $(PACKAGE)  ## the package as it stands here, with all it needs, into .venv
 
@@ -99,7 +103,7 @@ $(MADE):
 	  echo 'No suitable Python among: $(or $(PYTHON),$(CANDIDATES)). Install Python 3.10 to 3.13' \
 	    'with venv (Debian, Ubuntu: apt install python3-venv), or name one: make PYTHON=...' >&2; \
 	  exit 1; fi; \
-	echo "making .venv (about a minute) with $$($$python --version) and $(if $(ROS),ROS $(ROS),the wheels of ROS jazzy)"; \
+	echo "making .venv (about a minute) with $$($$python --version) and $(if $(ROS),ROS $(ROS),the wheels of ROS $(DISTRO))"; \
 	$$python -m venv --clear $(if $(ROS),--system-site-packages) $(VENV)
 	@touch $@
 
@@ -115,11 +119,12 @@ $(DEPENDENCIES): setup.py pyproject.toml $(LOCK) $(MADE)
 	echo '$(LOCK) cannot be installed here ($(VENV)/lock.log); taking the ranges of setup.py' >&2;) \
 	$(PIP) $(SETUPTOOLS) \
 	  $(if $(ROS),"numpy==$$(python3 -c 'import numpy; print(numpy.__version__)')") \
-	  '.[$(if $(ROS),,jazzy$(comma))plot]' && touch $@
+	  '.[$(if $(ROS),,$(DISTRO)$(comma)$(DISTRO)-lint$(comma))plot]' && touch $@
 
 lock: $(MADE)  ## renew the requirements*.lock from the ranges of setup.py
 	$(PIP) '.[lock]'
-	echo $(SETUPTOOLS) | $(COMPILE) --extra jazzy --extra plot setup.py - -o requirements.lock
+	echo $(SETUPTOOLS) | $(COMPILE) --extra jazzy --extra jazzy-lint --extra plot setup.py - -o requirements.lock
+	echo $(SETUPTOOLS) | $(COMPILE) --extra kilted --extra kilted-lint --extra plot setup.py - -o requirements-kilted.lock
 	$(COMPILE) --extra lint --extra test --constraint requirements.lock setup.py -o requirements-test.lock
 	$(COMPILE) --extra docs --constraint requirements.lock setup.py -o requirements-docs.lock
 

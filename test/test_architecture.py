@@ -72,6 +72,9 @@ MESSAGES_ALLOWED = {
 }
 """Patterns of the files that import message packages, each with its reason."""
 
+DISTROS = ('jazzy', 'kilted')
+"""Releases of ROS of which an extra brings the client library."""
+
 WITH_RCLPY = {'action_msgs', 'builtin_interfaces', 'rcl_interfaces'}
 """Message packages that the wheel of rclpy brings along."""
 
@@ -282,9 +285,10 @@ def test_dependencies_agree():
     }
     ros = {name for name in manifest('exec_depend') if is_message_package(name)} | {'rclpy'}
     assert python == distributions(setup_arguments()['install_requires'])
-    assert {name.replace('_', '-') for name in ros - WITH_RCLPY} == {
-        name.removeprefix('ros-jazzy-') for name in distributions(extras['jazzy'])
-    }
+    for distro in DISTROS:
+        assert {name.replace('_', '-') for name in ros - WITH_RCLPY} == {
+            name.removeprefix(f'ros-{distro}-') for name in distributions(extras[distro])
+        }
     assert {'matplotlib'} == distributions(extras['plot'])
 
 
@@ -299,16 +303,16 @@ def test_test_dependencies_agree():
     only_pip |= {'aiohttp', 'mcap', 'mcap-ros2-support', 'rosbags', 'zstandard'}
     only_pip |= {'argcomplete', 'control', 'mujoco', 'pin', 'playwright', 'tqdm'}
     assert declared | only_pip == extra
-    wheels = distributions(setup_arguments()['extras_require']['lint'])
-    assert linters - {'ament_copyright'} == {  # of which there is no wheel
-        name.removeprefix('ros-jazzy-').replace('-', '_')
-        for name in wheels
-        if name.startswith('ros-jazzy-')
-    }
+    for distro in DISTROS:
+        wheels = distributions(setup_arguments()['extras_require'][f'{distro}-lint'])
+        assert linters - {'ament_copyright'} == {  # of which there is no wheel
+            name.removeprefix(f'ros-{distro}-').replace('-', '_') for name in wheels
+        }
 
 
 LOCKS = {
-    'requirements.lock': ('jazzy', 'plot'),
+    'requirements.lock': ('jazzy', 'jazzy-lint', 'plot'),
+    'requirements-kilted.lock': ('kilted', 'kilted-lint', 'plot'),
     'requirements-test.lock': ('lint', 'test'),
     'requirements-docs.lock': ('docs',),
 }
@@ -335,7 +339,7 @@ def test_the_lock_holds_what_make_installs(name):
         for requirement in arguments['extras_require'][extra]:
             exact = re.match(r'([\w.-]+)(?:\[\w+\])?==(\S+)', requirement)
             assert exact is None or f'\n{exact[1]}=={exact[2]}' in text.replace('[fastrtps]', '')
-    assert wanted | ({'setuptools'} if 'jazzy' in LOCKS[name] else set()) <= locked
+    assert wanted | ({'setuptools'} if 'plot' in LOCKS[name] else set()) <= locked
 
 
 def test_what_is_imported_is_declared():
