@@ -79,11 +79,12 @@ docs: install $(SITE)  ## the documentation as a site, build/docs/index.html
 	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs $(ARGS)
 	@echo 'open build/docs/index.html'
 
-examples: install  ## run examples/, which renews the pictures in docs/images/examples
+examples: install  ## run examples/, which renews their pictures in docs/images, and the moving one
 	@mkdir -p build/examples
 	for file in examples/*.py; do \
 	  MPLBACKEND=Agg $(BIN)/python $$file build/examples/$$(basename $$file .py).png || exit 1; done
 	cp build/examples/*.png docs/images/examples/
+	$(BIN)/flat_plan joint1=pi --duration 1 --animate docs/images/turn.gif >/dev/null
 
 lint: install $(TESTING)  ## ruff and mypy only
 	$(BIN)/python -m ruff check

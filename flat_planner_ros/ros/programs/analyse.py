@@ -15,7 +15,7 @@
 """The monitor's report from a recording: read, computed again, printed and drawn."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import replace
 from functools import partial
@@ -29,6 +29,7 @@ from flat_planner_ros.core.monitor import MonitorSettings
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.programs.command_line import (
+    animation_name,
     explain_missing,
     explain_os,
     figure_name,
@@ -90,8 +91,10 @@ def main(args: Sequence[str] | None = None) -> int:
         0 with at least one report, 1 without.
 
     """
-    options = parsed(_parser(), (sys.argv if args is None else args)[1:], ['json', 'plot'])
-    if missing := missing_for_plot(options.plot):
+    options = parsed(
+        _parser(), (sys.argv if args is None else args)[1:], ['json', 'plot', 'animate']
+    )
+    if missing := missing_for_plot(options.plot, options.animate):
         print(missing, file=sys.stderr)
         return 1
     try:
@@ -102,7 +105,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return explain_missing(error, 'record')
     recording = None
     try:
-        check_writable(options.json, options.plot)
+        check_writable(options.json, options.plot, options.animate)
         with progress(len(storage_files(options.file)), 'analyse') as advance:
             recording = Recording(options.file, advance)
             sources = find_sources(
@@ -149,6 +152,12 @@ def _parser() -> ArgumentParser:
         metavar='FILE',
         type=figure_name,
         help='the motions, .png, .pdf or .svg; several as FILE-1, FILE-2 …; - for the only one',
+    )
+    parser.add_argument(
+        '--animate',
+        metavar='FILE',
+        type=animation_name,
+        help='the motions as moving pictures, .gif, or .mp4 with ffmpeg; names as for --plot',
     )
     parser.add_argument(
         '--params-file',
@@ -218,7 +227,7 @@ class _Telling:
         self._waiting: dict[str, Any] | None = None
         self._remarks: list[str] = []
         self._reports: list[Mapping[str, Any]] = []
-        self._figure = _Figures(options.plot)
+        self._figures = [_Figures(options.plot, _draw), _Figures(options.animate, _animate)]
         where = f'plans from {sources.plan}, joint states from {sources.joint_states}'
         self._head = f'{options.file}: {where}'
 
@@ -244,7 +253,8 @@ class _Telling:
         self._waiting = _as_dict(judgement)
         if self._options.json is not None:
             self._reports.append(self._waiting)
-        self._figure.take(judgement)
+        for figures in self._figures:
+            figures.take(judgement)
         start = self._waiting['values']['start_time']
         self._recorded = {key: its for key, its in self._recorded.items() if key >= start}
         if start in self._recorded:
@@ -260,7 +270,8 @@ class _Telling:
             print(remark)
         if self._recording.damage:
             print(f'{DAMAGED}: {self._recording.damage}')
-        self._figure.end()
+        for figures in self._figures:
+            figures.end()
 
     def write_json(self, name: str) -> None:
         """Write the reports as JSON."""
@@ -307,11 +318,13 @@ class _Figures:
     ----------
     name
         As given, None for no figures.
+    draw
+        Draws a motion into a file.
 
     """
 
-    def __init__(self, name: str | None) -> None:
-        self._name = name
+    def __init__(self, name: str | None, draw: 'Callable[[Judgement, Path], None]') -> None:
+        self._name, self._draw = name, draw
         self._first: Judgement | None = None
         self._count = 0
 
@@ -326,33 +339,44 @@ class _Figures:
         if self._name == STANDARD_OUTPUT:
             raise NotWritten('several motions are as many figures: --plot needs a name')
         if self._first is not None:
-            self._draw(self._first, 1)
+            self._write(self._first, 1)
             self._first = None
-        self._draw(judgement, self._count)
+        self._write(judgement, self._count)
 
     def end(self) -> None:
         """Draw the only motion."""
         if self._first is not None:
-            self._draw(self._first, None)
+            self._write(self._first, None)
 
-    def _draw(self, judgement: 'Judgement', number: int | None) -> None:
-        """Draw a motion."""
-        # Imported here: matplotlib is an extra.
-        from flat_planner_ros.figures.analysis_figure import draw
-
+    def _write(self, judgement: 'Judgement', number: int | None) -> None:
+        """Draw a motion into its file."""
         name = str(self._name)
         if number is not None:
             name = str(Path(name).with_stem(f'{Path(name).stem}-{number}'))
-        drawn = partial(
-            draw,
-            judgement.report,
-            judgement.motion,
-            judgement.times,
-            judgement.positions,
-            judgement.efforts,
-        )
-        write_through(name, drawn, '.png')
+        write_through(name, partial(self._draw, judgement), '.png')
         print(f'figure: {name}', file=sys.stderr)
+
+
+def _draw(judgement: 'Judgement', path: Path) -> None:
+    """Draw a motion and what it left behind."""
+    # Imported here, as below: matplotlib is an extra.
+    from flat_planner_ros.figures.analysis_figure import draw
+
+    draw(
+        judgement.report,
+        judgement.motion,
+        judgement.times,
+        judgement.positions,
+        judgement.efforts,
+        path,
+    )
+
+
+def _animate(judgement: 'Judgement', path: Path) -> None:
+    """Write a motion as a moving picture."""
+    from flat_planner_ros.figures.plan_animation import animate_recording
+
+    animate_recording(judgement.motion, judgement.times, judgement.positions, path)
 
 
 def _as_dict(judgement: 'Judgement') -> dict[str, Any]:

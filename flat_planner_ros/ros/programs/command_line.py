@@ -25,6 +25,7 @@ from importlib.util import find_spec
 from math import inf, nan
 import os
 from pathlib import Path
+from shutil import which
 import sys
 from typing import Any
 
@@ -33,6 +34,9 @@ from flat_planner_ros.ros.programs.angles import angle_of, FORMS
 from flat_planner_ros.ros.programs.outputs import STANDARD_OUTPUT
 from flat_planner_ros.version import version_line
 import numpy as np
+
+ANIMATION_SUFFIXES = ('.gif', '.mp4')
+"""Kinds of moving pictures."""
 
 FIGURE_SUFFIXES = ('.png', '.pdf', '.svg')
 """Suffixes of figures, which decide what is drawn."""
@@ -175,6 +179,26 @@ def figure_name(text: str) -> str:
     )
 
 
+def animation_name(text: str) -> str:
+    """
+    Return the name of a moving picture whose suffix says what to write.
+
+    Raises
+    ------
+    ArgumentTypeError
+        No such suffix, or a film where there is no ffmpeg to make it.
+
+    """
+    suffix = Path(text).suffix
+    if suffix not in ANIMATION_SUFFIXES or Path(text).is_dir():
+        raise ArgumentTypeError(
+            f'{text!r} is no file name that ends in {", ".join(ANIMATION_SUFFIXES)}'
+        )
+    if suffix != '.gif' and which('ffmpeg') is None:
+        raise ArgumentTypeError(f'{text!r} needs ffmpeg, which is not installed; a .gif does not')
+    return text
+
+
 def explain_os(error: OSError) -> str:
     """Return what the operating system complains about, without its number."""
     reason = error.strerror or str(error)
@@ -206,11 +230,11 @@ def explain_missing(error: ImportError, extra: str) -> int:
     return 1
 
 
-def missing_for_plot(path: str | None) -> str:
-    """Return what a figure needs that is not installed, empty if nothing or no figure."""
-    if path is None or find_spec('matplotlib') is not None:
+def missing_for_plot(*paths: str | None) -> str:
+    """Return what figures need that is not installed, empty if nothing or no figure."""
+    if not any(paths) or find_spec('matplotlib') is not None:
         return ''
-    return f'--plot needs matplotlib: {_remedy("matplotlib", "plot")}'
+    return f'figures need matplotlib: {_remedy("matplotlib", "plot")}'
 
 
 def _remedy(library: str, extra: str) -> str:

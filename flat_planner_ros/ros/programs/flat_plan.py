@@ -25,7 +25,7 @@ from time import perf_counter
 from typing import TextIO
 
 from flat_planner_ros.core.arm import FlatPlannerError
-from flat_planner_ros.core.planning import Reason, RequestRejected
+from flat_planner_ros.core.planning import Plan, Reason, RequestRejected
 from flat_planner_ros.core.session import (
     Goal,
     GoalPoint,
@@ -40,6 +40,7 @@ from flat_planner_ros.ros.parameters.parameter_file import ASSIGNMENT, read_sett
 from flat_planner_ros.ros.parameters.planner import build, ROWS
 from flat_planner_ros.ros.programs.angles import FORMS
 from flat_planner_ros.ros.programs.command_line import (
+    animation_name,
     by_joint,
     explain_os,
     figure_name,
@@ -67,6 +68,8 @@ examples:
       your own arm, with a figure
   flat_plan joint1=3.14159 --duration 1 -p strategy:=mixed -p weights.energy:=2.0 --csv plan.csv
       another strategy, as points every sampling.period
+  flat_plan joint1=pi --duration 1 --animate turn.gif
+      the arm in motion, with and without regard to its elastic joint
   flat_plan joint1=1 joint2=0.5 --start joint1=-1 --params-file arm_3dof.yaml --duration 2
       from another start; joints that are not named stay where they are
   flat_plan joint1=2 --duration 2 --via 'joint1=1.5@0.8' --json -
@@ -95,12 +98,12 @@ def main(args: Sequence[str] | None = None) -> int:
         0 if there is a plan, 1 if the goal or the parameters are refused, 2 for a wrong call.
 
     """
-    options = parsed(_parser(), args, ['csv', 'json', 'plot'])
-    if missing := missing_for_plot(options.plot):
+    options = parsed(_parser(), args, ['csv', 'json', 'plot', 'animate'])
+    if missing := missing_for_plot(options.plot, options.animate):
         print(f'flat_plan: {missing}', file=sys.stderr)
         return 1
     try:
-        check_writable(options.csv, options.json, options.plot)
+        check_writable(options.csv, options.json, options.plot, options.animate)
         settings = read_settings(
             options.params_file,
             ROWS,
@@ -124,6 +127,8 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'flat_plan: {remark}', file=sys.stderr)
         _print_summary(motion, values, summary_stream(options.csv, options.json, options.plot))
         _write(options, joints, track, values)
+        if options.animate:
+            _animate(options, motion.plan)
     except RequestRejected as error:
         code = interfaces.ERROR_CODES[error.reason]
         hint = '; here: --duration' if options.duration == 0.0 and error.value is None else ''
@@ -199,6 +204,13 @@ def _parser() -> ArgumentParser:
         metavar='FILE',
         type=figure_name,
         help='figure of the motion, .png, .pdf or .svg (needs matplotlib)',
+    )
+    output.add_argument(
+        '--animate',
+        metavar='FILE',
+        type=animation_name,
+        help='moving picture, .gif, or .mp4 with ffmpeg: the simulated arm, beside a turn with '
+        'the torque for a stiff joint',
     )
     return parser
 
@@ -286,6 +298,24 @@ def _write(
         from flat_planner_ros.figures.plan_figure import draw_plan
 
         write_through(options.plot, lambda path: draw_plan(track, joints, path), '.png')
+
+
+def _animate(options: Namespace, plan: Plan) -> None:
+    """Write the plan as the plant of the same file would play it if it were as planned."""
+    # Imported here: matplotlib is an extra.
+    from flat_planner_ros.figures.animation import animate
+    from flat_planner_ros.figures.plan_animation import plan_scenes
+    from flat_planner_ros.ros.parameters import plant
+
+    settings = read_settings(
+        options.params_file,
+        plant.ROWS,
+        plant.build,
+        node=f'{options.namespace}/{interfaces.PLANT}',
+    )
+    drives = replace(settings.simulation.drives, drive=plan.options.drive)
+    scenes = plan_scenes(plan, drives)
+    write_through(options.animate, lambda path: animate(scenes, path), '.gif')
 
 
 def _number(text: str) -> float | str:

@@ -470,8 +470,11 @@ def test_a_motion_is_drawn(graph, tmp_path):
     pytest.importorskip('matplotlib')
     path, picture = tmp_path / 'motion.mcap', tmp_path / 'motion.png'
     record_motion(graph, path)
-    assert analyse.main(['analyse', str(path), '--plot', str(picture)]) == 0
+    film = tmp_path / 'motion.gif'
+    arguments = ['--plot', str(picture), '--animate', str(film)]
+    assert analyse.main(['analyse', str(path), *arguments]) == 0
     assert picture.read_bytes().startswith(b'\x89PNG')
+    assert film.read_bytes().startswith(b'GIF89a')
 
 
 @pytest.mark.parametrize(
