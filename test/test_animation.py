@@ -24,19 +24,12 @@ from flat_planner_ros.core import (
     rollout,
     ViaPoint,
 )
+from flat_planner_ros.figures.animation import FRAME_RATE, outline
+from flat_planner_ros.figures.plan_animation import AFTERWARDS, plan_scenes, stiff_turn
 from flat_planner_ros.ros.programs import flat_plan
 import numpy as np
+from PIL import Image
 import pytest
-
-pytest.importorskip('matplotlib')
-
-from flat_planner_ros.figures.animation import FRAME_RATE, outline  # noqa: E402
-from flat_planner_ros.figures.plan_animation import (  # noqa: E402
-    AFTERWARDS,
-    plan_scenes,
-    stiff_turn,
-)
-from PIL import Image  # noqa: E402
 
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
 REQUEST = MotionRequest(start=(0.2, 0.0), final=(2.0, 0.0), duration=0.8)
