@@ -198,6 +198,12 @@ class ArmDynamics:
         return bool(self.viscous_friction.any() or self.coulomb_friction.any())
 
     @cached_property
+    def is_linear(self) -> bool:
+        """Whether accelerations are linear in angles, velocities and efforts."""
+        is_dry = bool(self.coulomb_friction.any())
+        return self._inverse_mass is not None and not self.has_weight and not is_dry
+
+    @cached_property
     def has_weight(self) -> bool:
         """Whether gravity moves the arm, so that it takes efforts to keep it at rest."""
         return self.gravity != 0.0 and bool(self.static_moment.any())

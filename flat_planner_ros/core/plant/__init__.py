@@ -17,8 +17,10 @@
 from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.paced_arm import PacedArm
+from flat_planner_ros.core.plant.rollout import rollout
 from flat_planner_ros.core.plant.settings import Sensing, SimulationSettings
-from flat_planner_ros.core.plant.simulation import ArmState, rollout, SimulatedArm
+from flat_planner_ros.core.plant.simulation import SimulatedArm
+from flat_planner_ros.core.plant.states import ArmState
 
 __all__ = [
     'ArmState',

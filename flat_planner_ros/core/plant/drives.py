@@ -149,6 +149,11 @@ class Drives:
         """Whether the positions of a command matter."""
         return self.has_feedback or self.servo is not None
 
+    def is_open_loop(self, now: float) -> bool:
+        """Whether exactly the efforts that are commanded will act, from a time on [s]."""
+        is_left_alone = now > self._pushed_until
+        return is_left_alone and not (self.follows_positions or self._is_limited)
+
     def feed_forward(self, reference: JointReference, q: FloatArray) -> FloatArray:
         """Return what is applied without looking at errors, shape (n-1,) [N m]."""
         if self.arm.has_weight and reference.effort is self.idle.effort:

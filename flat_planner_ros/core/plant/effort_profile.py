@@ -65,11 +65,33 @@ class JointReference(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Efforts that are linear in time between knots; times from the command's start [s]."""
+    """
+    Efforts that are linear in time between knots.
 
+    Attributes
+    ----------
+    knots, times
+        Times of the knots from the command's start, as an array and as a list, (m,) [s].
+    before
+        Effort before the first one, shape (n-1,) [N m].
+    efforts, slopes
+        At the knots, and from each to the next, shape (m, n-1) [N m], [N m/s].
+
+    """
+
+    knots: FloatArray
     times: list[float]
+    before: FloatArray
     efforts: FloatArray
     slopes: FloatArray
+
+    def at(self, elapsed: FloatArray) -> FloatArray:
+        """Return the efforts at times (m,) from the command's start [s], shape (m, n-1) [N m]."""
+        knots = self.knots
+        i = np.searchsorted(knots, elapsed, side='right') - 1
+        efforts: FloatArray = self.efforts[i] + self.slopes[i] * (elapsed - knots[i])[:, None]
+        efforts[i < 0] = self.before
+        return efforts
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,9 +185,13 @@ class EffortProfile:
         course, elapsed = self._course, t - self.start
         i = bisect_right(course.times, elapsed) - 1
         if i < 0:
-            return self._before
+            return course.before
         effort: FloatArray = course.efforts[i] + course.slopes[i] * (elapsed - course.times[i])
         return effort
+
+    def efforts_at(self, times: FloatArray) -> FloatArray:
+        """Return the efforts at absolute times (m,) [s], shape (m, n-1) [N m]."""
+        return self._course.at(times - self.start)
 
     def reference(self, t: float) -> JointReference:
         """
@@ -230,7 +256,8 @@ class EffortProfile:
         if anchor < times[0]:
             times, efforts = np.append(anchor, times), np.vstack((self._before, efforts))
         slopes = np.diff(efforts, axis=0) / np.diff(times)[:, None]
-        return _Course(times.tolist(), efforts, np.vstack((slopes, np.zeros(self.motors))))
+        slopes = np.vstack((slopes, np.zeros(self.motors)))
+        return _Course(times, times.tolist(), self._before, efforts, slopes)
 
 
 def check_bound(name: str, values: FloatArray, bound: float, unit: str) -> None:

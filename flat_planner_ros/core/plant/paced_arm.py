@@ -20,7 +20,8 @@ from math import floor
 from flat_planner_ros.core.arm import InvalidCommand, InvalidModel
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.settings import Sensor, SimulationSettings
-from flat_planner_ros.core.plant.simulation import ArmState, GRID_TOLERANCE, SimulatedArm
+from flat_planner_ros.core.plant.simulation import GRID_TOLERANCE, SimulatedArm
+from flat_planner_ros.core.plant.states import ArmState
 import numpy as np
 import numpy.typing as npt
 
@@ -330,20 +331,17 @@ class PacedArm:
     def _advance(self, until: float) -> list[ArmState]:
         """Integrate in whole steps to an own time of the arm [s]; return the samples passed."""
         target = floor(until / self._simulated.step + GRID_TOLERANCE)
-        samples = []
-        while (due := self._sampled * self._per_sample) <= target:
-            self._simulated.advance(due * self._simulated.step)
-            samples.append(self._sample())
-            self._sampled += 1
-        self._simulated.advance(target * self._simulated.step)
+        step, begun = self._simulated.step, self._sampled
+        self._sampled = max(begun, target // self._per_sample + 1)
+        due = [index * self._per_sample * step for index in range(begun, self._sampled)]
+        passed = self._simulated.advance_through(due, target * step)
+        samples = [
+            self._sensor.measure(state._replace(time=self._offset + state.time))
+            for state in passed
+        ]
         if self._simulated.take_expired():
             self._incidents.broken = self._settings.input_timeout
         return samples
-
-    def _sample(self) -> ArmState:
-        """Return what the sensors show now."""
-        state = self._simulated.state
-        return self._sensor.measure(state._replace(time=self.time))
 
     def _play(self, profile: EffortProfile) -> None:
         """Play a command that is stamped in the time outside."""

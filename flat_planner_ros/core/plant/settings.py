@@ -19,7 +19,8 @@ from math import ceil
 
 from flat_planner_ros.core.arm import check_number, InvalidModel, PlanarArm
 from flat_planner_ros.core.plant.drives import Drives, DriveSettings
-from flat_planner_ros.core.plant.simulation import ArmState, GRID_TOLERANCE
+from flat_planner_ros.core.plant.simulation import GRID_TOLERANCE
+from flat_planner_ros.core.plant.states import ArmState
 import numpy as np
 
 FINEST = 1e-12

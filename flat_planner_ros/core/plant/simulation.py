@@ -14,8 +14,8 @@
 
 """True dynamics of an arm under a stamped effort command."""
 
-from math import floor, inf
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from math import floor, inf, sqrt
 
 from flat_planner_ros.core.arm import (
     check_number,
@@ -33,6 +33,8 @@ from flat_planner_ros.core.plant.effort_profile import (
     MAX_EFFORT,
     MAX_VELOCITY,
 )
+from flat_planner_ros.core.plant.states import ArmState, PassedStates
+from flat_planner_ros.core.plant.steps import linear_steps, runge_kutta
 import numpy as np
 import numpy.typing as npt
 
@@ -44,25 +46,6 @@ MAX_SPEED = 10 * MAX_VELOCITY
 
 UNLIMITED = DriveSettings()
 """Motors that give every effort that is commanded."""
-
-
-class ArmState(NamedTuple):
-    """
-    Motion of an arm at one time.
-
-    Attributes
-    ----------
-    time
-        Simulated time [s].
-    position, velocity, effort
-        Joint angles [rad], velocities [rad/s], efforts with the spring's [N m], shape (n,).
-
-    """
-
-    time: float
-    position: FloatArray
-    velocity: FloatArray
-    effort: FloatArray
 
 
 class SimulatedArm:
@@ -276,8 +259,10 @@ class SimulatedArm:
 
     def advance(self, until: float) -> int:
         """Integrate to the last grid time that is not after `until` [s]; return the steps."""
-        target = floor((until - self._origin) / self._step + GRID_TOLERANCE)
-        steps = max(0, target - self._count)
+        steps = self._steps_until(until)
+        if self._take_linear_steps(steps) is not None:
+            return steps
+        target = self._count + steps
         reference = self._reference(self.time)
         for _ in range(steps):
             if self._fault:
@@ -285,6 +270,61 @@ class SimulatedArm:
                 break
             reference = self._advance_once(reference)
         return steps
+
+    def advance_through(self, times: Sequence[float], until: float) -> list[ArmState]:
+        """
+        Integrate as `advance` does; return the states on the way.
+
+        Parameters
+        ----------
+        times
+            When states are wanted, in order, from the present on and not after `until` [s].
+        until
+            Absolute time [s].
+
+        """
+        rows = [self._steps_until(time) for time in times]
+        first, passed = self._count, self._take_linear_steps(self._steps_until(until))
+        if passed is not None:
+            return [passed.state(self._origin + (first + row) * self._step, row) for row in rows]
+        states = []
+        for time in times:
+            self.advance(time)
+            states.append(self.state)
+        self.advance(until)
+        return states
+
+    def _steps_until(self, until: float) -> int:
+        """Return how many steps there are to the last grid time not after another time [s]."""
+        target = floor((until - self._origin) / self._step + GRID_TOLERANCE)
+        return max(0, target - self._count)
+
+    def _take_linear_steps(self, steps: int) -> PassedStates | None:
+        """Take steps as products; None, and none is taken, where they are not that simple."""
+        is_simple = self._drives.is_open_loop(self.time) and self._braked_until == -inf
+        linear = linear_steps(self.arm, self._step) if is_simple and not self._fault else None
+        if linear is None or not steps:
+            return None
+        halves: FloatArray = np.arange(0.0, steps + 0.25, 0.5)
+        times = self._origin + (self._count + halves) * self._step
+        efforts, n = self._efforts(times), self.arm.n
+        with np.errstate(over='ignore', invalid='ignore'):  # of an arm that runs away
+            states = linear.states(np.concatenate([self._position, self._velocity]), efforts)
+        velocities = states[:, n:]
+        if not (np.abs(velocities) < MAX_SPEED / sqrt(n)).all():  # nor is NaN below
+            return None
+        self._count += steps
+        self._position, self._velocity = states[-1, :n], velocities[-1]
+        return PassedStates(self.arm, states[:, :n], velocities, efforts[::2])
+
+    def _efforts(self, times: FloatArray) -> FloatArray:
+        """Return what is commanded at absolute times (m,) [s], shape (m, n-1) [N m]."""
+        profile, idle = self._profile, self._drives.idle.effort
+        if profile is None:
+            return np.where((times < self._held_until)[:, None], self._held.effort, idle)
+        efforts = profile.efforts_at(times)
+        efforts[(times < self._idle_until) | (times > profile.end)] = idle
+        return efforts
 
     @property
     def _is_braked(self) -> bool:
@@ -303,19 +343,11 @@ class SimulatedArm:
         self._count += 1
         end = self._reference(self.time)
         self._is_clipped = False
-        ddq_1 = self._acceleration(start, q, dq)
-        dq_2 = dq + h / 2 * ddq_1
-        ddq_2 = self._acceleration(middle, q + h / 2 * dq, dq_2)
-        dq_3 = dq + h / 2 * ddq_2
-        ddq_3 = self._acceleration(middle, q + h / 2 * dq_2, dq_3)
-        ddq_4 = self._acceleration(end, q + h * dq_3, dq + h * ddq_3)
-        inner = ddq_2 + ddq_3
-        velocity = dq + h / 6 * (ddq_1 + 2 * inner + ddq_4)
+        position, velocity = runge_kutta(self._acceleration, h, q, dq, (start, middle, end))
         if not velocity.dot(velocity) < MAX_SPEED**2:  # nor is NaN below
             self._stop(velocity)
             return end
-        self._position = q + h * (dq + h / 6 * (ddq_1 + inner))
-        self._velocity = velocity
+        self._position, self._velocity = position, velocity
         if self._is_clipped:
             self._clipped_steps += 1
         return end
@@ -356,42 +388,3 @@ class SimulatedArm:
             reference = profile.reference(t)
             return reference._replace(effort=idle.effort) if is_idle else reference
         return idle if is_idle else idle._replace(effort=profile.effort(t))
-
-
-class Rollout(NamedTuple):
-    """States on a grid of times (m,) [s]: positions [rad] and velocities [rad/s], shape (m, n)."""
-
-    times: FloatArray
-    positions: FloatArray
-    velocities: FloatArray
-
-
-def rollout(
-    arm: PlanarArm,
-    profile: EffortProfile,
-    until: float,
-    *,
-    step: float = 1e-3,
-    **options: Any,
-) -> Rollout:
-    """
-    Return the motion of an arm, at rest when the profile starts, at every step.
-
-    Parameters
-    ----------
-    arm, profile
-        What is moved and by what.
-    until
-        Absolute time of the end [s].
-    step, options
-        As in SimulatedArm.
-
-    """
-    simulated = SimulatedArm(arm, time=profile.start, step=step, **options)
-    simulated.command(profile, profile.start)
-    times, positions, velocities = [simulated.time], [simulated.position], [simulated.velocity]
-    while simulated.advance(min(until, simulated.time + step)):
-        times.append(simulated.time)
-        positions.append(simulated.position)
-        velocities.append(simulated.velocity)
-    return Rollout(np.array(times), np.array(positions), np.array(velocities))

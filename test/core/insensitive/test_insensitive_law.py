@@ -37,7 +37,7 @@ from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.simulation import rollout
+from flat_planner_ros.core.plant.rollout import rollout
 import numpy as np
 import pytest
 

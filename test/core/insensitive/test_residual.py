@@ -24,7 +24,7 @@ from flat_planner_ros.core.insensitive.residual import (
     residual_amplitude,
 )
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.simulation import rollout
+from flat_planner_ros.core.plant.rollout import rollout
 import numpy as np
 import pytest
 

@@ -28,7 +28,7 @@ from flat_planner_ros.core.monitor.identification import (
 from flat_planner_ros.core.monitor.oscillation import fit_oscillation
 from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.simulation import rollout
+from flat_planner_ros.core.plant.rollout import rollout
 import numpy as np
 import pytest
 from random_cases import cases

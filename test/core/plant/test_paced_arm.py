@@ -27,8 +27,8 @@ from flat_planner_ros.core.plant.paced_arm import (
     MAX_CATCH_UP,
     PacedArm,
 )
+from flat_planner_ros.core.plant.rollout import rollout
 from flat_planner_ros.core.plant.settings import Sensing, SimulationSettings
-from flat_planner_ros.core.plant.simulation import rollout
 import numpy as np
 import pytest
 

@@ -23,8 +23,9 @@ from flat_planner_ros.core.planning.request import MotionRequest, PlanningOption
 from flat_planner_ros.core.planning.tradeoff import residual_of_plan
 from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
+from flat_planner_ros.core.plant.rollout import rollout
 from flat_planner_ros.core.plant.settings import SimulationSettings
-from flat_planner_ros.core.plant.simulation import rollout, SimulatedArm
+from flat_planner_ros.core.plant.simulation import SimulatedArm
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -16,7 +16,7 @@
 
 from flat_planner_ros.core.arm.errors import InvalidModel
 from flat_planner_ros.core.plant.settings import Sensing, Sensor
-from flat_planner_ros.core.plant.simulation import ArmState
+from flat_planner_ros.core.plant.states import ArmState
 import numpy as np
 import pytest
 

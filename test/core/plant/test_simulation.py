@@ -22,7 +22,8 @@ from flat_planner_ros.core.arm.errors import InvalidCommand, InvalidModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.simulation import rollout, SimulatedArm
+from flat_planner_ros.core.plant.rollout import rollout
+from flat_planner_ros.core.plant.simulation import SimulatedArm
 import numpy as np
 import pytest
 from scipy.integrate import simpson, solve_ivp
