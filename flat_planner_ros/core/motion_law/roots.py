@@ -118,7 +118,8 @@ class Spectrum:
 
     def clusters(self, scale: float = 1.0) -> list[Cluster]:
         """Return the clusters of all roots multiplied by a positive factor."""
-        return self.grouped(self.groupings(np.array([scale]))[0], scale)
+        is_apart = scale > self._apart_beyond
+        return self.grouped(APART if is_apart else self.groupings(np.array([scale]))[0], scale)
 
     def grouped(self, key: bytes, scale: float) -> list[Cluster]:
         """Return clusters of a grouping, of all roots multiplied by a positive factor."""

@@ -100,7 +100,8 @@ class TermSum:
 
         """
         result = plain_sums(self.decays, self.factors[: order + 1], distances)
-        self.add_others(result, distances)
+        if self.others:
+            self.add_others(result, distances)
         return result
 
     def fill_odd_grid(self, table: FloatArray, scales: FloatArray) -> None:
@@ -216,8 +217,9 @@ class TermSums:
     def at(self, distances: FloatArray) -> FloatArray:
         """Return all sums and all their derivatives, as `TermSum.at`, shape (s, orders, m)."""
         result = plain_sums(self.decays, self.factors, distances)
-        for values, single in zip(result, self.singles(), strict=True):
-            single.add_others(values, distances)
+        if any(self.others):
+            for values, single in zip(result, self.singles(), strict=True):
+                single.add_others(values, distances)
         return result
 
     def singles(self) -> list[TermSum]:
@@ -252,7 +254,7 @@ def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray)
         fall = -decays[..., None, None] * distances
         np.exp(fall, out=fall)
         _split(fall, basis[..., : 4 * count, :].reshape(*decays.shape, 2, 2, places))
-    rows = np.moveaxis(basis, -2, 0)
+    rows = basis.swapaxes(-2, 0)
     _fill_powers(rows[4 * count :], 0.5 * (distances[0] - distances[1]))
     sums: FloatArray = factors @ basis
     return sums

@@ -58,6 +58,9 @@ NOISE = 1e-12
 FIRST_LAYER = 0.125
 """Part of a smooth piece that its first and last segment take, without boundary layers [-]."""
 
+SECOND_CUT = 0.3125
+"""Where the next one ends: at once, as most laws would be cut there after a look [-]."""
+
 SEEN_RATE = 17.0
 """Rate of a boundary layer that such a segment resolves, in 2 / length of the piece [-]."""
 
@@ -226,7 +229,8 @@ def _first_bounds(trajectory: ReferenceTrajectory, rates: ComplexArray) -> tuple
     rate = share * np.abs(rates.real).max(initial=SEEN_RATE)
     depth = ceil(log2(max(rate / SEEN_RATE, 1.0)))
     layers = FIRST_LAYER * 0.5 ** np.arange(depth, -1.0, -1.0)
-    fractions = np.concatenate([[0.0], layers, [0.5], 1.0 - layers[::-1]])
+    cuts = np.append(layers, SECOND_CUT)
+    fractions = np.concatenate([[0.0], cuts, [0.5], 1.0 - cuts[::-1]])
     inner = edges[:-1, None] + lengths[:, None] * fractions
     return np.append(inner.ravel(), edges[-1]), CONDITIONS
 
@@ -254,13 +258,13 @@ def _tail(values: FloatArray) -> FloatArray:
 
 def _top_times(mesh: _Mesh) -> FloatArray:
     """Return when the negatives of all quantities, then the quantities, are largest [s]."""
-    values = np.concatenate([-mesh.values, mesh.values])
-    series = values @ _TO_SERIES
+    series = mesh.values @ _TO_SERIES
     places = series @ _TO_SEARCH
     if not mesh.resolved.all():
         # Between the nodes of a jump a series overshoots; each side is a node.
-        nodes = np.repeat(values, DENSITY, axis=-1)[..., : places.shape[-1]]
+        nodes = np.repeat(mesh.values, DENSITY, axis=-1)[..., : places.shape[-1]]
         places = np.where(mesh.resolved[:, None], places, nodes)
+    series, places = np.concatenate([-series, series]), np.concatenate([-places, places])
     highest, lowest = places.max(axis=(1, 2)), places.min(axis=(1, 2))
     # In steps of what is rounding, so that a plateau has few tops.
     grain = NOISE * np.maximum(np.abs(highest), np.abs(lowest)) + TINY
@@ -276,7 +280,7 @@ def _top_times(mesh: _Mesh) -> FloatArray:
     times = mesh.starts[segment] + mesh.lengths[segment] * (0.5 * (x + 1.0))
     # Sorted by quantity, then height: the last of each is the highest.
     order = np.lexsort((heights, quantity))
-    last = np.searchsorted(quantity[order], np.arange(len(values)), side='right') - 1
+    last = np.searchsorted(quantity[order], np.arange(len(places)), side='right') - 1
     highest_at: FloatArray = times[order[last]]
     return highest_at
 

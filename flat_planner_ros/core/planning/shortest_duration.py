@@ -25,8 +25,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import exp, inf, isfinite, log, sqrt
 
-from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, OutOfReach, UncertifiedPlan
+from flat_planner_ros.core.arm import (
+    FlatPlannerError,
+    FloatArray,
+    InvalidRequest,
+    OutOfReach,
+    UncertifiedPlan,
+)
 from flat_planner_ros.core.planning.certified_plan import Plan
+from flat_planner_ros.core.planning.duration_trial import duration_of, root_of, Trial
 from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 import numpy as np
@@ -52,13 +59,13 @@ DIGITS = 9
 PATIENCE = 2
 """Secants in a row that do not halve a gap, after which a bisection does [-]."""
 
+NARROW = 1.05
+"""Ratio of two durations between which trials are looked at in full [-]."""
+
 ALIKE = 1.02
 """Ratio of two uses of a limit, both beyond it, between which others are taken to be [-]."""
 
-HOPELESS = 100.0
-"""Use of a limit of velocity or effort beyond which no shorter duration is tried [-]."""
-
-SAMPLES = 33
+SAMPLES = 65
 """Times at which a duration of a scan is looked at: most are ruled out by that."""
 
 POWERS = {Quantity.POSITION: 2.0, Quantity.VELOCITY: 1.0, Quantity.EFFORT: 2.0}
@@ -95,48 +102,6 @@ class NoFeasibleDuration(FlatPlannerError):
         super().__init__(
             f'no duration from {self.shortest:g} to {self.longest:g} s obeys the limits'
         )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Trial:
-    """
-    A duration that was tried.
-
-    Attributes
-    ----------
-    duration
-        What was tried [s].
-    plan
-        Motion of that duration; None where there is no certified one.
-    worst
-        The limit of which that uses most; None where nothing is known.
-    ratio
-        Use of that limit [-].
-    estimate
-        Duration at which all limits would just be obeyed if peaks were powers of it [s].
-    is_sampled
-        Whether the use is that at some times only, at most the true one.
-
-    """
-
-    duration: float
-    plan: Plan | None
-    worst: LimitUse | None
-    ratio: float
-    estimate: float
-    is_sampled: bool = False
-
-    @property
-    def obeys(self) -> bool:
-        """Tell whether the motion obeys all limits."""
-        return self.ratio <= 1.0 and not self.is_sampled
-
-    @property
-    def is_hopeless(self) -> bool:
-        """Tell whether nothing faster will obey: from rest it moves as far in less time."""
-        if self.plan is None or self.worst is None or self.worst.quantity is Quantity.POSITION:
-            return False
-        return self.plan.request.start_jets is None and self.ratio > HOPELESS
 
 
 def shortest_plan(
@@ -201,7 +166,9 @@ class _Search:
     longest: float
     most: float = inf
     is_bound: bool = False
-    trials: dict[float, _Trial] = field(default_factory=dict)
+    trials: dict[float, Trial] = field(default_factory=dict)
+    peaks: FloatArray = field(default_factory=lambda: np.zeros(0))
+    peaks_of: float = inf
     failure: FlatPlannerError | None = None
 
     def run(self) -> Plan:
@@ -210,7 +177,9 @@ class _Search:
             trial = self._try(self.shortest)
             if trial.obeys and trial.plan is not None:
                 return trial.plan
-        if not self._bracket():
+        self._bracket()
+        self._refine()
+        if not self._is_confirmed():
             self._scan(self.shortest, self.longest)
             self._refuse_if_none()
         while True:
@@ -226,24 +195,24 @@ class _Search:
         return len(self.trials) >= self.most
 
     @property
-    def _lowest(self) -> _Trial:
+    def _lowest(self) -> Trial:
         """Return the shortest trial that obeys."""
         return min((t for t in self.trials.values() if t.obeys), key=lambda t: t.duration)
 
-    def _try(self, duration: float) -> _Trial:
+    def _try(self, duration: float) -> Trial:
         """Return the trial of a duration."""
         return self._looked_at(duration)
 
-    def _try_briefly(self, duration: float) -> _Trial:
+    def _try_briefly(self, duration: float) -> Trial:
         """Return the trial of a duration, by samples if they rule it out."""
         trial = self._glance(duration)
         return self._try(duration) if trial.is_sampled and trial.ratio <= 1.0 else trial
 
-    def _glance(self, duration: float) -> _Trial:
+    def _glance(self, duration: float) -> Trial:
         """Return the trial of a duration by samples, unless more is known."""
         return self._looked_at(duration, is_sampled=True)
 
-    def _looked_at(self, duration: float, *, is_sampled: bool = False) -> _Trial:
+    def _looked_at(self, duration: float, *, is_sampled: bool = False) -> Trial:
         """Return the trial of a duration, rounded so that its usual text is exactly it."""
         rounded = float(f'{duration:.{DIGITS}g}')
         duration = min(max(rounded, self.shortest), self.longest)
@@ -254,33 +223,36 @@ class _Search:
             plan = self.plan_of(duration) if known is None or known.plan is None else known.plan
         except (UncertifiedPlan, OutOfReach) as error:
             self.failure = error
-            trial = _Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
+            trial = Trial(duration=duration, plan=None, worst=None, ratio=inf, estimate=duration)
         else:
             self._refuse_ends(plan)
             if is_sampled:
-                times = plan.duration * np.linspace(0.0, 1.0, SAMPLES)
-                uses = self.limits.uses_at(plan, times)
+                fractions = np.concatenate([np.linspace(0.0, 1.0, SAMPLES), self.peaks])
+                uses = self.limits.uses_at(plan, plan.duration * fractions)
             else:
                 uses = self.limits.uses(plan)
+                self.peaks = np.array([use.time for use in uses]) / plan.duration
+                self.peaks_of = duration
             worst = max(uses, key=lambda use: use.ratio, default=None)
             stretch = [use.ratio ** (1.0 / POWERS[use.quantity]) for use in uses]
-            trial = _Trial(
+            trial = Trial(
                 duration=duration,
                 plan=plan,
                 worst=worst,
                 ratio=0.0 if worst is None else worst.ratio,
                 estimate=duration * max(stretch, default=0.0),
                 is_sampled=is_sampled,
+                is_sharp=not is_sampled or self._is_near_peaks(duration),
             )
         self.trials[duration] = trial
         return trial
 
-    def _bracket(self) -> bool:
-        """
-        Look for one duration that obeys above one that does not; tell if any obeys.
+    def _is_near_peaks(self, duration: float) -> bool:
+        """Tell whether the peaks of nearly the same duration are known."""
+        return 1.0 / NARROW < duration / self.peaks_of < NARROW
 
-        By samples, as long as they seem to obey; the shortest that really does is the last.
-        """
+    def _bracket(self) -> None:
+        """Look, by samples, for one duration that seems to obey above one that does not."""
         stride = FIRST_STRIDE
         first = self.shortest if self.is_bound else sqrt(self.shortest * self.longest)
         trial = self._glance(first)
@@ -293,28 +265,40 @@ class _Search:
                 beyond = min(self.longest, max(trial.estimate * AIM, here * stride))
             stride *= stride
             if beyond == here or self._is_content:
-                break
+                return
             trial = self._glance(beyond)
-        seeming = sorted(t.duration for t in self.trials.values() if t.ratio <= 1.0)
-        return any(self._try(duration).obeys for duration in seeming)
+
+    @property
+    def _seeming(self) -> list[Trial]:
+        """Return the trials that obey or seem to, the shortest first."""
+        return sorted((t for t in self.trials.values() if t.ratio <= 1.0), key=duration_of)
+
+    def _is_confirmed(self) -> bool:
+        """Look in full at what seems to obey; tell if anything does."""
+        return any(self._try(trial.duration).obeys for trial in self._seeming)
 
     def _refine(self) -> None:
-        """Close the gap between the shortest trial that obeys and the next below."""
+        """
+        Close the gap between the shortest trial that obeys and the next below.
+
+        By samples, until it is narrow: the times of the peaks are among them then, and what
+        seems to obey is looked at in full.
+        """
         slow = 0
-        while True:
-            good = self._lowest
+        while self._seeming and not self._is_content:
+            good = self._seeming[0]
             below = [t for t in self.trials.values() if t.duration < good.duration]
-            if self._is_content:
-                return
-            if not below:
-                if good.duration == self.shortest:
-                    return
-                self._try(max(self.shortest, good.duration / SCAN_STEP))
+            bad = max(below, key=duration_of, default=None)
+            width = inf if bad is None else good.duration / bad.duration
+            is_last = width <= 1.0 + DURATION_TOLERANCE or good.duration == self.shortest
+            if good.is_sampled and (is_last or width <= NARROW):
+                self._try(good.duration)
                 continue
-            bad = max(below, key=lambda t: t.duration)
-            width = good.duration / bad.duration
-            if width <= 1.0 + DURATION_TOLERANCE:
+            if is_last:
                 return
+            if bad is None:
+                self._glance(max(self.shortest, good.duration / SCAN_STEP))
+                continue
             middle = sqrt(bad.duration * good.duration)
             if slow < PATIENCE and isfinite(bad.ratio) and good.ratio > 0.0:
                 # It aims a little beyond the root: one trial on either side of it, that near,
@@ -323,18 +307,19 @@ class _Search:
             margin = 1.0 + 0.5 * DURATION_TOLERANCE
             middle = min(max(middle, bad.duration * margin), good.duration / margin)
             left = good.duration / middle
-            if self._try(middle).obeys:
+            if self._glance(middle).ratio <= 1.0:
                 left = middle / bad.duration
             slow = slow % (PATIENCE + 1) + 1 if log(left) > 0.5 * log(width) else 0
 
-    def _secant(self, bad: _Trial, good: _Trial) -> float:
+    def _secant(self, bad: Trial, good: Trial) -> float:
         """Return where the limit is just reached, by a secant in logarithms: powers are lines."""
-        known = [t for t in self.trials.values() if 0.0 < t.ratio < inf]
-        known.sort(key=lambda trial: abs(log(trial.ratio)))
         low, high = log(bad.duration), log(good.duration)
+        known = [t for t in self.trials.values() if 0.0 < t.ratio < inf]
+        sharp = [t for t in known if t.is_sharp] or known
+        sharp.sort(key=lambda trial: abs(log(trial.ratio)))
         # Through the two trials nearest to the limit, though they may be on one side of it.
-        root = _root(known[0], known[1])
-        return exp(root if low < root < high else _root(bad, good))
+        root = log(bad.estimate) if len(sharp) < 2 else root_of(sharp[0], sharp[1])
+        return exp(root if low < root < high else root_of(bad, good))
 
     def _scan(self, low: float, high: float) -> None:
         """Try a grid of durations between two."""
@@ -348,8 +333,8 @@ class _Search:
     def _is_ruled_out(self, duration: float) -> bool:
         """Tell whether a limit is exceeded by nearly the same on both sides: a static load."""
         trials = self.trials.values()
-        below = max((t for t in trials if t.duration < duration), key=_duration, default=None)
-        above = min((t for t in trials if t.duration > duration), key=_duration, default=None)
+        below = max((t for t in trials if t.duration < duration), key=duration_of, default=None)
+        above = min((t for t in trials if t.duration > duration), key=duration_of, default=None)
         if below is None or above is None or below.worst is None or above.worst is None:
             return False
         ratios = below.ratio, above.ratio
@@ -376,17 +361,3 @@ class _Search:
             raise NoFeasibleDuration(least.worst, least.duration, self.shortest, self.longest)
         if self.failure is not None:
             raise self.failure
-
-
-def _duration(trial: _Trial) -> float:
-    """Return the duration of a trial [s]."""
-    return trial.duration
-
-
-def _root(first: _Trial, second: _Trial) -> float:
-    """Return the logarithm of the duration at which a line through two trials is at the limit."""
-    rise = log(second.ratio) - log(first.ratio)
-    if rise == 0.0:
-        return inf
-    start = log(first.duration)
-    return start - log(first.ratio) / rise * (log(second.duration) - start)
