@@ -66,6 +66,8 @@ setup(
         # Completion of the programs' options in a shell.
         'complete': ['argcomplete>=3,<4'],
         'plot': ['matplotlib>=3.6,<4'],
+        # Studies on a cluster, and their tables as Parquet files.
+        'study': ['distributed>=2024.1', 'pyarrow>=14'],
         # What benchmarks/ compares with; each may be missing.
         'bench': [
             'casadi>=3.6,<4',
@@ -105,6 +107,7 @@ setup(
             'aiohttp>=3.9,<4',
             'argcomplete>=3,<4',
             'control>=0.10,<0.11',
+            'distributed>=2024.1',
             'hypothesis>=6.98,<7',
             'matplotlib>=3.6,<4',
             'mcap>=1.6,<2',
@@ -114,6 +117,7 @@ setup(
             'mypy>=2.4,<2.5',
             'pin>=3,<5',
             'playwright>=1.49,<2',
+            'pyarrow>=14',
             'pytest>=7.4,<10',
             'pytest-timeout>=2.2,<3',
             'pytest-xdist>=3.5,<4',
@@ -139,6 +143,7 @@ setup(
             'flat_plan = flat_planner_ros.programs:flat_plan',
             'paper_table = flat_planner_ros.programs:paper_table',
             'tradeoff = flat_planner_ros.programs:tradeoff',
+            'study = flat_planner_ros.programs:study',
         ],
     },
     zip_safe=True,

@@ -27,6 +27,9 @@ from types import FrameType
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Signals that end a program."""
 
+THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
+"""Variables that libraries of linear algebra read when they are loaded."""
+
 INTERRUPTED = 130
 """Exit code of a tool that was ended before it was done."""
 
@@ -74,6 +77,14 @@ def flat_plan() -> int:
 def tradeoff() -> int:
     """Show effort against residual."""
     return _run_tool('programs.tradeoff')
+
+
+def study() -> int:
+    """Do the rows of a study."""
+    # A process does one row after the other: more threads would only wait for each other.
+    for variable in THREADS:
+        os.environ.setdefault(variable, '1')
+    return _run_tool('study.program')
 
 
 def make_urdf() -> int:

@@ -47,6 +47,7 @@ WINGS = {
     'tracking': 'arm',
     'model_fit': 'arm',
     'excitation': 'planning model_fit arm',
+    'study': 'plan_table session planning plant tracking insensitive arm',
 }
 """The wings of the core, each with the others from whose public lists it may import."""
 
@@ -301,7 +302,16 @@ def test_test_dependencies_agree():
     declared = {name.removeprefix('python3-') for name in manifest('test_depend') - linters}
     only_pip = {'mpmath', 'mypy', 'pytest-xdist', 'ruff'}
     only_pip |= {'aiohttp', 'mcap', 'mcap-ros2-support', 'rosbags', 'zstandard'}
-    only_pip |= {'argcomplete', 'control', 'mujoco', 'pin', 'playwright', 'tqdm'}
+    only_pip |= {
+        'argcomplete',
+        'control',
+        'distributed',
+        'mujoco',
+        'pin',
+        'playwright',
+        'pyarrow',
+        'tqdm',
+    }
     assert declared | only_pip == extra
     for distro in DISTROS:
         wheels = distributions(setup_arguments()['extras_require'][f'{distro}-lint'])
@@ -348,7 +358,7 @@ def test_what_is_imported_is_declared():
     declared |= set().union(
         *(
             distributions(setup_arguments()['extras_require'][extra])
-            for extra in ('record', 'live', 'complete', 'progress')
+            for extra in ('record', 'live', 'complete', 'progress', 'study')
         )
     )
     used = set().union(*map(roots, [*PACKAGE.rglob('*.py'), *CHECKOUT.glob('launch/*.py')]))

@@ -14,6 +14,7 @@
 
 """Arm: the model. Links, dynamics, counterbalances, flat map; its errors and measured samples."""
 
+from flat_planner_ros.core.arm.arm_stack import ArmStack
 from flat_planner_ros.core.arm.arrays import (
     check_number,
     checked_array,
@@ -47,6 +48,7 @@ from flat_planner_ros.core.arm.joint_merger import JointMerger
 from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
 from flat_planner_ros.core.arm.planar_arm import Drive, NaturalMode, PlanarArm
 from flat_planner_ros.core.arm.samples import (
+    cubic_coefficients,
     JointSample,
     JointStateRules,
     JUMP,
@@ -67,6 +69,7 @@ from flat_planner_ros.core.arm.urdf import (
 __all__ = [
     'apply_row',
     'ArmDescription',
+    'ArmStack',
     'balanced',
     'bodies_from_links',
     'bodies_from_reduced',
@@ -78,6 +81,7 @@ __all__ = [
     'COULOMB_VELOCITY',
     'counterbalances',
     'Counterbalances',
+    'cubic_coefficients',
     'displaced_com',
     'Drive',
     'flat_map',

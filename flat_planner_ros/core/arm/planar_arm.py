@@ -21,7 +21,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm.arrays import check_number, checked_array, FloatArray, locked
-from flat_planner_ros.core.arm.dynamics import ArmDynamics
+from flat_planner_ros.core.arm.dynamics import ArmDynamics, Real
 from flat_planner_ros.core.arm.errors import InvalidModel, NotFlat
 from flat_planner_ros.core.arm.links import (
     chain_load,
@@ -382,6 +382,26 @@ class PlanarArm(ArmDynamics):
 
         """
         both, last = self.inertia_star
-        inertia = last if held else last * (both - last) / both  # rotors n-1 and n in series
-        frequency = sqrt(self.stiffness / inertia)
-        return NaturalMode(frequency, self.damping / (2 * inertia * frequency))
+        frequency, ratio = free_oscillation(both, last, self.stiffness, self.damping, held=held)
+        return NaturalMode(float(frequency), float(ratio))
+
+
+def free_oscillation(
+    both: Real, last: Real, stiffness: Real, damping: Real, *, held: bool
+) -> tuple[Real, Real]:
+    """
+    Return undamped angular frequency [rad/s] and damping ratio [-] of a passive joint.
+
+    Parameters
+    ----------
+    both, last
+        I*_{n-1} and I*_n, of one arm or of many [kg m^2].
+    stiffness, damping
+        Passive joint [N m/rad], [N m s/rad].
+    held
+        Whether the actuated joints are held; otherwise joint n-1 is free.
+
+    """
+    inertia = last if held else last * (both - last) / both  # rotors n-1 and n in series
+    frequency = np.sqrt(stiffness / inertia)
+    return frequency, damping / (2 * inertia * frequency)

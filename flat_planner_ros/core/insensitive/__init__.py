@@ -36,6 +36,7 @@ from flat_planner_ros.core.insensitive.law import (
 )
 from flat_planner_ros.core.insensitive.oscillator import largest, Oscillator
 from flat_planner_ros.core.insensitive.residual import (
+    driven_angle,
     predict_residual,
     PredictedResidual,
     residual_amplitude,
@@ -53,6 +54,7 @@ __all__ = [
     'check_insensitivity',
     'Criterion',
     'DEFAULT_WEIGHT',
+    'driven_angle',
     'imbalance_residual',
     'insensitive_motion',
     'insensitive_motion_from',

@@ -346,12 +346,34 @@ def predict_residual(
 def _largest_miss(
     arm: PlanarArm, effort: FloatArray, duration: float, box: UncertaintyBox
 ) -> float:
-    """Return how far from the goal an effort leaves a heavier or lighter arm, (I18) [rad]."""
+    """Return how far from the goal an effort leaves a heavier or lighter arm of a box [rad]."""
     if box.ranges[2] == (1.0, 1.0):
         return 0.0
     both, last = arm.inertia_star
+    planned = driven_angle(both, effort, duration)
+    others = [both + last * (factor - 1.0) for factor in box.ranges[2]]
+    return max(abs(planned - driven_angle(other, effort, duration)) for other in others)
+
+
+def driven_angle(both: float, effort: FloatArray, duration: float) -> float:
+    """
+    Return the angle by which an effort moves the last two links, their swing left out [rad].
+
+    Parameters
+    ----------
+    both
+        I*_{n-1} of the arm [kg m^2].
+    effort
+        Of joint n-1 at even times, both ends included, joined linearly, shape (m,) [N m].
+    duration
+        From the first to the last [s].
+
+    References
+    ----------
+    (I18) of docs/derivation.md is the difference of two arms' angles.
+
+    """
     step = duration / (len(effort) - 1)
     # The momentum of the last two links, integrated: exact for an effort of hats.
     moved = step * float(effort[::-1] @ (step * np.arange(len(effort))))
-    changes = [last * (factor - 1.0) for factor in box.ranges[2]]
-    return max(abs(moved * (1.0 / both - 1.0 / (both + change))) for change in changes)
+    return moved / both

@@ -36,6 +36,7 @@ from flat_planner_ros.core.insensitive import (
     servo_effort,
     shaped_quintic,
     Shaper,
+    UncertaintyBox,
 )
 from flat_planner_ros.core.motion_law import Strategy
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
@@ -144,6 +145,31 @@ def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> Predi
         An arm within the uncertainty does not oscillate.
 
     """
+    arm, box = planned.problem.arm, planned.options.insensitivity.box
+    return residual_on(arm, box, planned, samples)
+
+
+def residual_on(
+    arm: PlanarArm, box: UncertaintyBox, planned: Plan, samples: PlanSamples | None = None
+) -> PredictedResidual:
+    """
+    Return what a plan leaves behind on an arm of one's choice, and on the worst of a box about it.
+
+    Parameters
+    ----------
+    arm
+        That plays it, flat.
+    box
+        What may differ from this arm.
+    planned, samples
+        As for `residual_of_plan`; the miss is that of an arm of the box about this one.
+
+    Raises
+    ------
+    InvalidRequest
+        An arm within the uncertainty does not oscillate.
+
+    """
     drive = planned.options.drive
     is_coarse = samples is None or len(samples.times) <= INTERVALS
     if samples is None or (drive is Drive.POSITION and is_coarse):
@@ -152,10 +178,10 @@ def residual_of_plan(planned: Plan, samples: PlanSamples | None = None) -> Predi
     if planned.request.start_jets is not None:
         start = (float(samples.positions[0, -1]), float(samples.velocities[0, -1]))
     return predict_residual(
-        planned.problem.arm,
+        arm,
         samples.driving_effort if drive is Drive.EFFORT else samples.driving_velocity,
         planned.duration,
-        planned.options.insensitivity.box,
+        box,
         start,
         drive=drive,
     )

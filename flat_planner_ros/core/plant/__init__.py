@@ -16,6 +16,8 @@
 
 from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
+from flat_planner_ros.core.plant.exact_steps import CommandTable, exact_ends, States
+from flat_planner_ros.core.plant.many_arms import integrated_ends
 from flat_planner_ros.core.plant.paced_arm import PacedArm
 from flat_planner_ros.core.plant.rollout import rollout
 from flat_planner_ros.core.plant.settings import Sensing, SimulationSettings
@@ -24,11 +26,15 @@ from flat_planner_ros.core.plant.states import ArmState
 
 __all__ = [
     'ArmState',
+    'CommandTable',
     'DriveSettings',
     'EffortProfile',
+    'exact_ends',
+    'integrated_ends',
     'PacedArm',
     'rollout',
     'Sensing',
     'SimulatedArm',
     'SimulationSettings',
+    'States',
 ]

@@ -15,7 +15,7 @@
 """Session: goals and measurements in, motions and verdicts out, in the order of time."""
 
 from flat_planner_ros.core.session.execution import Astray, clock_fault, Ended, Outcome, Shortfall
-from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint
+from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint, MAX_ANGLE
 from flat_planner_ros.core.session.path_goal import path_goal
 from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import (
@@ -25,6 +25,7 @@ from flat_planner_ros.core.session.settings import (
     StartSource,
     WhenMoving,
 )
+from flat_planner_ros.core.session.single_goal import single_goal
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     'Ended',
     'Goal',
     'GoalPoint',
+    'MAX_ANGLE',
     'Motion',
     'Outcome',
     'path_goal',
@@ -42,6 +44,7 @@ __all__ = [
     'SessionSettings',
     'SettlePose',
     'Shortfall',
+    'single_goal',
     'StartSource',
     'Timeline',
     'Track',

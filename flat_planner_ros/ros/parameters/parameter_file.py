@@ -41,6 +41,9 @@ from rclpy.parameter import Parameter
 BLOCK = 'ros__parameters'
 """Key under which a parameter file lists a node's values."""
 
+STUDY = 'study'
+"""Key under which a parameter file says what a study varies, which is for no node."""
+
 ASSIGNMENT = ':='
 """Between name and value of an override, as ROS writes it."""
 
@@ -80,7 +83,7 @@ def read_settings(
 
     """
     name = '/' + node.strip('/')
-    given = {} if path is None else _from_file(Path(path), name)
+    given = {} if path is None else file_values(Path(path), name)
     for doubt in () if path is None else _missed(Path(path), name):
         warn(doubt)
     for override in overrides:
@@ -92,6 +95,26 @@ def read_settings(
                 f'{meant if "=" in override and not separator else ""}'
             )
         given[name] = parsed(text, f'the value of {name}')
+    return settings_of(given, rows, build, warn)
+
+
+def settings_of(
+    given: Values,
+    rows: Sequence[Row],
+    build: Callable[[Values], Settings],
+    warn: Callable[[str], object] = lambda text: None,
+) -> Settings:
+    """
+    Return the settings that a node would start with, were it given these values.
+
+    Parameters
+    ----------
+    given
+        Values by the names of parameters.
+    rows, build, warn
+        As for `read_settings`, whose errors are these too.
+
+    """
     refuse_unknown(given, [row.name for row in rows], warn)
     defaults = model_defaults(given)
     values = {}
@@ -119,7 +142,7 @@ def block_names(path: Path) -> list[str]:
         The file cannot be read.
 
     """
-    return [pattern for pattern, _ in _blocks(_content(path), path)]
+    return [pattern for pattern, _ in _blocks(file_content(path), path)]
 
 
 def reaches(pattern: str, node: str) -> bool:
@@ -145,17 +168,32 @@ def _missed(path: Path, node: str) -> Iterator[str]:
         yield f'{path}: no block is for {node}, only {", ".join(blocks)}; it has no effect'
 
 
-def _from_file(path: Path, node: str) -> dict[str, Any]:
-    """Return all values in a file that are meant for a node, later blocks winning."""
+def file_values(path: Path, node: str) -> dict[str, Any]:
+    """
+    Return all values in a file that are meant for a node, later blocks winning.
+
+    Parameters
+    ----------
+    path
+        Parameter file.
+    node
+        Name of the node with its namespace, e.g. ``/flat_planner``.
+
+    Raises
+    ------
+    InvalidParameter
+        The file cannot be read, or is none.
+
+    """
     values: dict[str, Any] = {}
-    for pattern, block in _blocks(_content(path), path):
+    for pattern, block in _blocks(file_content(path), path):
         if reaches(pattern, node):
             values.update(_flat(block))
     return values
 
 
-def _content(path: Path) -> Mapping[str, Any]:
-    """Return the tree of blocks in a file."""
+def file_content(path: Path) -> Mapping[str, Any]:
+    """Return the tree of blocks in a file; InvalidParameter if it cannot be read."""
     try:
         text = path.read_text('utf-8')
     except (OSError, UnicodeDecodeError) as error:
@@ -172,6 +210,8 @@ def _blocks(
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Return the name pattern and the values of every node's block, namespaces unfolded."""
     for key, value in tree.items():
+        if key == STUDY and not prefix:
+            continue
         name = f'{prefix}/{str(key).strip("/")}'
         if not isinstance(value, Mapping):
             raise InvalidParameter(

@@ -83,7 +83,7 @@ def parsed(
 
 def _inputs(options: Namespace) -> list[Path]:
     """Return the files that are read, by the names that their options have in all programs."""
-    given = [getattr(options, name, None) for name in ('params_file', 'file', 'files')]
+    given = [getattr(options, name, None) for name in ('params_file', 'file', 'files', 'spec')]
     listed = [
         name for each in given if each for name in (each if isinstance(each, list) else [each])
     ]
@@ -148,6 +148,15 @@ def by_joint(angles: Iterable[tuple[str, float]]) -> dict[str, float]:
             raise ArgumentTypeError(f'{name} is given twice: {found[name]:g} and {angle:g}')
         found[name] = angle
     return found
+
+
+def via_point(text: str) -> tuple[dict[str, float], float]:
+    """Return a pose by joint [rad] and its time, 0 where it is left open [s]."""
+    pose, separator, time = text.partition('@')
+    try:
+        return by_joint(map(joint_angle, pose.split(','))), float(time) if separator else 0.0
+    except ValueError:
+        raise ArgumentTypeError(f'{time!r} in {text!r} is no time in seconds') from None
 
 
 def pose_of(angles: Mapping[str, float], joints: Sequence[str], what: str) -> FloatArray:

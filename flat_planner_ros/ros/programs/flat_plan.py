@@ -14,7 +14,7 @@
 
 """Plan a motion on the command line, without a ROS graph."""
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Mapping, Sequence
 import csv
 from dataclasses import replace
@@ -28,11 +28,10 @@ from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.planning import Plan, Reason, RequestRejected
 from flat_planner_ros.core.session import (
     Goal,
-    GoalPoint,
     Motion,
     PlannerSession,
     SessionSettings,
-    StartSource,
+    single_goal,
     Track,
 )
 from flat_planner_ros.ros.parameters.idle import idle_parameters
@@ -41,7 +40,6 @@ from flat_planner_ros.ros.parameters.planner import build, ROWS
 from flat_planner_ros.ros.programs.angles import FORMS
 from flat_planner_ros.ros.programs.command_line import (
     animation_name,
-    by_joint,
     explain_os,
     figure_name,
     joint_angle,
@@ -50,6 +48,7 @@ from flat_planner_ros.ros.programs.command_line import (
     parsed,
     pose_of,
     seconds,
+    via_point,
 )
 from flat_planner_ros.ros.programs.outputs import (
     check_writable,
@@ -180,7 +179,7 @@ def _parser() -> ArgumentParser:
         '--via',
         action='append',
         default=[],
-        type=_via,
+        type=via_point,
         metavar='JOINT=RAD[,JOINT=RAD…][@S]',
         help='point to pass, at a time, or all points where the planner chooses; may be repeated',
     )
@@ -215,15 +214,6 @@ def _parser() -> ArgumentParser:
     return parser
 
 
-def _via(text: str) -> tuple[dict[str, float], float]:
-    """Return a pose and its time, 0 where it is left open [s]."""
-    pose, separator, time = text.partition('@')
-    try:
-        return by_joint(map(joint_angle, pose.split(','))), float(time) if separator else 0.0
-    except ValueError:
-        raise ArgumentTypeError(f'{time!r} in {text!r} is no time in seconds') from None
-
-
 def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession, Goal]:
     """Return a planner at rest at the start, and the goal."""
     times = [*(time for _, time in options.via), options.duration]
@@ -231,29 +221,12 @@ def _task(settings: SessionSettings, options: Namespace) -> tuple[PlannerSession
         raise FlatPlannerError(
             'give every --via a time, as joint1=0.5@0.8, and --duration; or no --via a time'
         )
-    if options.via and not any(times[:-1]):
-        # The planner chooses when the points are passed; that is asked for without any time.
-        settings = replace(settings, default_duration=times[-1] or settings.default_duration)
-        times[-1] = 0.0
     angles = pose_of(options.start, settings.joints, '--start')
     start = dict(zip(settings.joints, angles.tolist(), strict=True))
-    session = PlannerSession(
-        replace(
-            settings,
-            start_source=StartSource.PARAMETER,
-            start_position=tuple(start.values()),
-            execute=False,
-        )
-    )
     poses = [start]
     for changes in [*(pose for pose, _ in options.via), options.goal]:
         poses.append({**poses[-1], **changes})
-    names = tuple(poses[-1])
-    points = [
-        GoalPoint(time=time, positions=tuple(pose.get(name, 0.0) for name in names))
-        for pose, time in zip(poses[1:], times, strict=True)
-    ]
-    return session, Goal(joint_names=names, points=tuple(points))
+    return single_goal(settings, poses, times)
 
 
 def _print_summary(motion: Motion, values: Mapping[str, str], file: TextIO) -> None:

@@ -1,0 +1,259 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pictures of studies: a map, curves or a distribution, drawn with matplotlib (extra `plot`)."""
+
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.session import Motion
+from flat_planner_ros.core.study import Case
+from flat_planner_ros.figures.file_plot import plt
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+import numpy as np
+
+COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
+"""Of curves: those of Okabe and Ito, which colour-blind people tell apart."""
+
+LINES = ('-', '--', '-.', ':')
+"""Of curves, which are told apart without colours too."""
+
+MAP = 'viridis'
+"""Colours of a map: from dark to light in print, too."""
+
+WIDE = 100.0
+"""Ratio of the largest to the smallest value from which a scale is logarithmic [-]."""
+
+FEW = 60
+"""Different values of an axis up to which each is a place of its own, not a cloud."""
+
+CELLS = 30
+"""Parts of an axis into which a cloud is sorted."""
+
+FAMILY = 12
+"""Most curves of a family."""
+
+BAND = (0.1, 0.9)
+"""Quantiles between which a band lies about a curve."""
+
+
+class Shown(NamedTuple):
+    """Title of a column, how it is called with its unit, and its values, shape (m,)."""
+
+    title: str
+    label: str
+    values: Sequence[Any]
+
+    @property
+    def is_number(self) -> bool:
+        """Tell whether the values are numbers."""
+        return all(isinstance(value, float) for value in self.values)
+
+    @property
+    def places(self) -> tuple[FloatArray, list[str]]:
+        """Return where the values are on an axis, and what stands there if they are no numbers."""
+        if self.is_number:
+            return np.array(self.values, dtype=float), []
+        names = list(dict.fromkeys(map(str, self.values)))
+        return np.array([float(names.index(str(value))) for value in self.values]), names
+
+
+def draw(
+    value: Shown, path: Path, *, x: Shown | None = None, y: Shown | None = None, by: Shown | None
+) -> None:
+    """
+    Draw a value.
+
+    Parameters
+    ----------
+    value
+        NaN in rows without one, which are those that are refused.
+    path
+        File to write; its suffix chooses the format.
+    x
+        Over what; without it the picture is a distribution.
+    y
+        With x, the picture is a map.
+    by
+        What tells curves, or distributions, apart.
+
+    """
+    figure, axis = plt.subplots(figsize=(7.0, 4.8))
+    if x is None:
+        _distribution(axis, value, by)
+    elif y is None:
+        _curves(axis, x, value, by)
+    else:
+        _map(axis, x, y, value)
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def draw_row(case: Case, motion: Motion, path: Path) -> None:
+    """Draw the motion of one row: planned angles and the efforts that they take."""
+    figure, (above, below) = plt.subplots(2, sharex=True, figsize=(7.0, 5.5))
+    samples, joints = motion.samples, case.settings.joints
+    styles = zip(cycle(COLOURS), cycle(LINES), strict=False)
+    for index, (name, (colour, line)) in enumerate(zip(joints, styles, strict=False)):
+        above.plot(samples.times, samples.positions[:, index], line, color=colour, label=name)
+        if index < len(joints) - 1:
+            below.plot(samples.times, samples.efforts[:, index], line, color=colour)
+    above.set_ylabel('planned angle [rad]')
+    below.set_ylabel('effort [N m]')
+    below.set_xlabel('time [s]')
+    above.legend(frameon=False)
+    above.set_title(f'{motion.plan.options.strategy.value}, {motion.plan.duration:.4g} s')
+    for axis in (above, below):
+        axis.grid(alpha=0.3)
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def _distribution(axis: Axes, value: Shown, by: Shown | None) -> None:
+    """Draw which share of the rows stays below a value."""
+    for name, rows, style in _families(value, by):
+        values = np.array(value.values, dtype=float)[rows]
+        known = np.sort(values[np.isfinite(values)])
+        # Refused rows never get there: the curve ends below one.
+        shares = np.arange(1.0, len(known) + 1.0) / max(len(values), 1)
+        axis.step(known, shares, where='post', label=name, **style)
+    _scale(axis.set_xscale, value)
+    axis.set_xlabel(value.label)
+    axis.set_ylabel('share of rows at or below [-]')
+    axis.set_ylim(0.0, 1.02)
+    _finish(axis, by)
+
+
+def _curves(axis: Axes, x: Shown, value: Shown, by: Shown | None) -> None:
+    """Draw the median over an axis, with a band where rows spread."""
+    places, names = x.places
+    values = np.array(value.values, dtype=float)
+    for name, rows, style in _families(value, by):
+        here, found = places[rows], values[rows]
+        centres, cells = _cells(here)
+        middle, low, high = (
+            np.array([_quantile(found[cells == k], share) for k in range(len(centres))])
+            for share in (0.5, *BAND)
+        )
+        axis.plot(centres, middle, label=name, marker='.', **style)
+        if (high > low).any():
+            axis.fill_between(centres, low, high, color=style['color'], alpha=0.15, linewidth=0.0)
+    if names:
+        axis.set_xticks(range(len(names)), names, rotation=20, ha='right')
+    _scale(axis.set_yscale, value)
+    axis.set_xlabel(x.label)
+    axis.set_ylabel(value.label)
+    _finish(axis, by)
+
+
+def _map(axis: Axes, x: Shown, y: Shown, value: Shown) -> None:
+    """Draw the median in the cells of two axes; cells whose rows are all refused are hatched."""
+    (across, across_names), (up, up_names) = x.places, y.places
+    values = np.array(value.values, dtype=float)
+    (columns, column), (rows, row) = _cells(across), _cells(up)
+    table = np.full((len(rows), len(columns)), np.nan)
+    is_met = np.zeros(table.shape, dtype=bool)
+    for i, j in set(zip(row.tolist(), column.tolist(), strict=True)):
+        is_met[i, j] = True
+        table[i, j] = _quantile(values[(row == i) & (column == j)], 0.5)
+    drawn = axis.pcolormesh(
+        _edges(columns), _edges(rows), table, cmap=MAP, norm=_norm(table), rasterized=True
+    )
+    axis.figure.colorbar(drawn, ax=axis, label=f'{value.label}, median')
+    refused = np.ma.masked_where(~(is_met & np.isnan(table)), np.zeros(table.shape))
+    if refused.count():
+        axis.pcolor(_edges(columns), _edges(rows), refused, cmap='Greys', hatch='///', alpha=0.0)
+        axis.set_title('hatched: refused', fontsize=9)
+    for place, names in ((axis.set_xticks, across_names), (axis.set_yticks, up_names)):
+        if names:
+            place(range(len(names)), names)
+    axis.set_xlabel(x.label)
+    axis.set_ylabel(y.label)
+
+
+def _families(
+    value: Shown, by: Shown | None
+) -> Sequence[tuple[str, np.typing.NDArray[np.intp], Mapping[str, Any]]]:
+    """Return name, rows and style of each curve; beyond a dozen, those of equal shares of rows."""
+    count = len(value.values)
+    if by is None:
+        return [('', np.arange(count), {'color': COLOURS[0], 'linestyle': '-'})]
+    places, names = by.places
+    kept = np.unique(places)
+    if len(kept) > FAMILY:
+        centres, cells = _cells(places)
+        kept = np.arange(float(min(len(centres), FAMILY)))
+        places, names = np.floor(cells * len(kept) / len(centres)), []
+    found: list[tuple[str, np.typing.NDArray[np.intp], Mapping[str, Any]]] = []
+    for index, place in enumerate(kept.tolist()):
+        style = {'color': COLOURS[index % len(COLOURS)], 'linestyle': LINES[index % len(LINES)]}
+        label = names[int(place)] if names else f'{place:.4g}'
+        found.append((label, np.flatnonzero(places == place), style))
+    return found
+
+
+def _cells(places: FloatArray) -> tuple[FloatArray, np.typing.NDArray[np.intp]]:
+    """Return the centres of an axis's cells, and in which of them each place is."""
+    centres, cells = np.unique(places, return_inverse=True)
+    if len(centres) <= FEW:
+        return centres, cells
+    edges = np.linspace(places.min(), places.max(), CELLS + 1)
+    return 0.5 * (edges[:-1] + edges[1:]), np.clip(
+        np.searchsorted(edges, places) - 1, 0, CELLS - 1
+    )
+
+
+def _edges(centres: FloatArray) -> FloatArray:
+    """Return the borders of cells about their centres."""
+    if len(centres) == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    middle = 0.5 * (centres[:-1] + centres[1:])
+    ends = 2.0 * centres[[0, -1]] - middle[[0, -1]]
+    return np.concatenate([ends[:1], middle, ends[1:]])
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    """Return a quantile of what is finite, NaN if nothing is."""
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, share)) if known.size else np.nan
+
+
+def _is_wide(values: FloatArray) -> bool:
+    """Tell whether values want a logarithmic scale."""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() > 0.0 and known.max() > WIDE * known.min())
+
+
+def _norm(table: FloatArray) -> Normalize:
+    """Return how values become colours."""
+    return LogNorm() if _is_wide(table) else Normalize()
+
+
+def _scale(set_scale: Any, value: Shown) -> None:
+    """Make an axis logarithmic where its values spread."""
+    if _is_wide(np.array(value.values, dtype=float)):
+        set_scale('log')
+
+
+def _finish(axis: Axes, by: Shown | None) -> None:
+    """Add the grid and the legend."""
+    axis.grid(alpha=0.3, which='both')
+    if by is not None:
+        axis.legend(title=by.label, frameon=False, fontsize=8)
