@@ -48,7 +48,7 @@ COMMAND = interfaces.topic_of(interfaces.PLANNER, interfaces.COMMAND)
 FREE_SECONDS = 10.0
 """Time for which the plant runs as fast as it can [s]."""
 
-SPEED_TARGETS = {2: 20.0, 4: 5.0}
+SPEED_TARGETS = {2: 80.0, 4: 5.0}
 """Simulated seconds per second at 200 Hz, by the number of joints [-]."""
 
 ARM_FILES = {2: None, 4: Path(__file__).parents[1] / 'config' / 'arm_4dof.yaml'}

@@ -38,6 +38,12 @@ SHIPPED = 'as shipped'
 SINGLE, EVENTS = 'SingleThreadedExecutor', 'EventsExecutor'
 """Executors to compare it with."""
 
+BARE = 'bare'
+"""Name of a node of rclpy that is nobody's, `bare_node.py`."""
+
+BARE_ANSWER = '/bare/answer'
+"""Its service."""
+
 STAMP = struct.Struct('<iI')
 """Seconds and nanoseconds, behind the four bytes that start a serialised message."""
 
@@ -66,7 +72,7 @@ class NodeProcess:
     Parameters
     ----------
     name
-        `planner`, `plant` or `monitor`.
+        `planner`, `plant`, `monitor` or `BARE`.
     executor
         What spins it.
     parameters : dict[str, str]
@@ -81,7 +87,9 @@ class NodeProcess:
     ) -> None:
         """Start it."""
         program = ['-m', f'flat_planner_ros.ros.nodes.{name}_node']
-        if executor != SHIPPED:
+        if name == BARE:
+            program = [str(Path(__file__).parent / 'bare_node.py')]
+        elif executor != SHIPPED:
             program = [str(Path(__file__).parent / 'spin_node.py'), name, executor]
         values = [f'{key}:={value}' for key, value in parameters.items()]
         overrides = ['--params-file', str(file)] if file else []

@@ -14,7 +14,8 @@
 
 """The version of the package, as its metadata have it."""
 
-from importlib.metadata import PackageNotFoundError, version
+from argparse import Action, ArgumentParser
+from typing import Any
 
 PACKAGE = 'flat_planner_ros'
 """Name of the package."""
@@ -22,7 +23,24 @@ PACKAGE = 'flat_planner_ros'
 
 def version_line() -> str:
     """Return what a program answers to --version."""
+    # Imported here: it takes a tenth of the start of a node, which needs it for --version only.
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return f'{PACKAGE} {version(PACKAGE)}'
     except PackageNotFoundError:
         return f'{PACKAGE}, not installed'
+
+
+class ShowVersion(Action):
+    """What --version does: print the line and end."""
+
+    def __init__(self, option_strings: list[str], dest: str, **options: Any) -> None:
+        super().__init__(
+            option_strings, dest, nargs=0, help="show program's version number and exit"
+        )
+
+    def __call__(self, parser: ArgumentParser, *_: Any) -> None:
+        """Print and end."""
+        print(version_line())
+        parser.exit()

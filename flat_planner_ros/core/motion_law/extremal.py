@@ -65,6 +65,9 @@ differs for equal numbers of two arms only where such an error crosses a multipl
 SAME = 2.0**-49
 """Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
 
+SOLVERS_KEPT = 16
+"""Equations, and parities of their laws, whose conditions' matrices are remembered."""
+
 UNITS_KEPT = 64
 """Unit motions in the cache; the one unused for longest makes room."""
 
@@ -114,8 +117,7 @@ def extremals(
     """
     half = 0.5 * duration
     powers = half**_ORDERS
-    found = Spectrum(coefficients * powers[::-1] ** 2).clusters()
-    solvers: dict[float, _BoundarySolver] = {}
+    equation = (coefficients * powers[::-1] ** 2).tobytes()
     laws = []
     for ends in conditions:
         start = ends.start * powers[:CONDITIONS]
@@ -131,9 +133,7 @@ def extremals(
             if parity > 0.0:
                 target[0] -= middle
             if target.any():
-                if parity not in solvers:
-                    solvers[parity] = _BoundarySolver(found, parity)
-                terms.extend(solvers[parity].terms(target))
+                terms.extend(_boundary_solver(equation, parity).terms(target))
         laws.append(ExponentialLaw(duration=duration, terms=tuple(terms)))
     return laws
 
@@ -214,6 +214,18 @@ class _BoundarySolver:
             if term.origin != 0:  # else it is symmetric by itself
                 terms.append(term.mirrored(self._parity))
         return terms
+
+
+@lru_cache(maxsize=SOLVERS_KEPT)
+def _boundary_solver(equation: bytes, parity: float) -> _BoundarySolver:
+    """Return the solver of an equation in normalised time, the bytes of its coefficients."""
+    return _BoundarySolver(_clusters(equation), parity)
+
+
+@lru_cache(maxsize=SOLVERS_KEPT)
+def _clusters(equation: bytes) -> Sequence[Cluster]:
+    """Return the clusters of its roots."""
+    return Spectrum(np.frombuffer(equation)).clusters()
 
 
 class Mean(NamedTuple):

@@ -419,6 +419,8 @@ class LawTrajectory:
             times = knots[:-1, None] + 0.5 * np.multiply.outer(lengths, nodes + 1.0)
             weights = np.multiply.outer(lengths, shares) / (2.0 * self.problem.duration)
             return times.ravel(), weights.ravel()
-        places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
+        places = np.column_stack([self.start[:, 0], self.final])
+        if len(self.edges) > 2:
+            places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
         travel = float(np.abs(np.diff(places)).sum())
         return motion_quadrature(self.problem.unit.law.rates, travel, self.edges)

@@ -16,7 +16,7 @@
 
 from flat_planner_ros.core.session import PlannerSession, Track
 from flat_planner_ros.ros.nodes.controller_client import ControllerClient
-from flat_planner_ros.ros.nodes.graph_watch import listeners, unheard
+from flat_planner_ros.ros.nodes.graph_watch import Audience, listeners
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
@@ -48,6 +48,7 @@ class CommandOutlet:
 
     def __init__(self, node: GuardedNode, session: PlannerSession, action: str) -> None:
         self._node = node
+        self._audience = Audience(node)
         self._controller = _controller(node, session, action) if action else None
         kind = message_class(JOINT_TRAJECTORY)
         self._command = node.create_publisher(kind, interfaces.COMMAND, interfaces.RELIABLE)
@@ -87,7 +88,7 @@ class CommandOutlet:
         if self._controller is not None:
             return self._controller.doubt
         streams = [interfaces.EFFORT_COMMANDS] if settings.stream_effort else []
-        return unheard(self._node, interfaces.COMMAND, *streams)
+        return self._audience.unheard(interfaces.COMMAND, *streams)
 
 
 def _controller(node: GuardedNode, session: PlannerSession, action: str) -> ControllerClient:

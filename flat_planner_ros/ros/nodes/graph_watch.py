@@ -16,6 +16,8 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from time import monotonic
+from typing import NamedTuple
 
 from flat_planner_ros.ros.nodes.node_log import NodeLog
 from rclpy.clock import Clock, ClockType
@@ -44,11 +46,47 @@ def listeners(node: Node, topic: str) -> list[str]:
     ]
 
 
-def unheard(node: Node, *topics: str) -> str:
-    """Return that nobody carries out what is published on topics, a clause; empty if one does."""
-    if any(listeners(node, topic) for topic in topics):
-        return ''
-    return f'nobody listens to {" or ".join(map(node.resolve_topic_name, topics))}'
+class Audience:
+    """
+    Whether anybody carries out what a node publishes.
+
+    Who listens is looked up when their number changes, else once in WATCH_PERIOD: it takes as long
+    as planning a motion.
+
+    Parameters
+    ----------
+    node
+        Node that publishes.
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._looks: dict[str, _Look] = {}
+
+    def unheard(self, *topics: str) -> str:
+        """Return that nobody carries out what is published on topics, a clause, or nothing."""
+        if any(self._is_heard(topic) for topic in topics):
+            return ''
+        names = map(self._node.resolve_topic_name, topics)
+        return f'nobody listens to {" or ".join(names)}'
+
+    def _is_heard(self, topic: str) -> bool:
+        """Tell whether anybody carries out what is published on a topic."""
+        number, now = self._node.count_subscribers(topic), monotonic()
+        look = self._looks.get(topic)
+        if look is None or number != look.number or now - look.time > WATCH_PERIOD:
+            look = _Look(number, now, bool(listeners(self._node, topic)))
+            self._looks[topic] = look
+        return look.is_heard
+
+
+class _Look(NamedTuple):
+    """A look at a topic: number of subscribers, when it was [s], whether one is no recorder."""
+
+    number: int
+    time: float
+    is_heard: bool
 
 
 class GraphWatch:

@@ -29,7 +29,7 @@ from flat_planner_ros.programs import SIGNALS
 from flat_planner_ros.ros.nodes.certain_end import certain_end
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import introduce
-from flat_planner_ros.version import version_line
+from flat_planner_ros.version import ShowVersion
 import rclpy
 from rclpy.exceptions import NotInitializedException, ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
@@ -179,7 +179,7 @@ def _refuse_strays(args: Sequence[str]) -> None:
         description='A node of flat_planner_ros; it runs until Ctrl-C.',
         epilog='ROS arguments follow --ros-args, e.g. --ros-args --params-file arm.yaml',
     )
-    parser.add_argument('--version', action='version', version=version_line())
+    parser.add_argument('--version', action=ShowVersion)
     _, strays = parser.parse_known_args(remove_ros_args(list(args))[1:])
     if strays:
         flag = next((stray for stray in strays if stray in ROS_FLAGS), None)

@@ -32,7 +32,7 @@ from typing import Any
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray
 from flat_planner_ros.ros.programs.angles import angle_of, FORMS
 from flat_planner_ros.ros.programs.outputs import STANDARD_OUTPUT
-from flat_planner_ros.version import version_line
+from flat_planner_ros.version import ShowVersion
 import numpy as np
 
 ANIMATION_SUFFIXES = ('.gif', '.mp4')
@@ -62,7 +62,7 @@ def parsed(
         file, and none is a file that is read.
 
     """
-    parser.add_argument('--version', action='version', version=version_line())
+    parser.add_argument('--version', action=ShowVersion)
     if COMPLETION in os.environ and find_spec('argcomplete') is not None:
         # Imported here: argcomplete is an extra.
         from argcomplete import autocomplete

@@ -1,0 +1,49 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A node of rclpy that answers one service and does nothing else: the least that a start takes."""
+
+from processes import BARE_ANSWER, EVENTS, new_executor
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+
+def _answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    """Say something."""
+    response.message = 'here'
+    return response
+
+
+def main() -> None:
+    """Spin until the process is asked to end."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.ALL)
+    node = Node('bare')
+    node.create_service(Trigger, BARE_ANSWER, _answer)
+    executor = new_executor(EVENTS)
+    executor.add_node(node)
+    try:
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=0.1)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()
