@@ -40,10 +40,11 @@ BENCHMARKS = (
     'peak',
     'model_fit',
     'tracking',
+    'tracking_nodes',
 )
 """Modules with a function `sections`, in this order."""
 
-WITH_ROS = ('node_path', 'goal_stream', 'plant', 'monitor', 'start_up')
+WITH_ROS = ('node_path', 'goal_stream', 'plant', 'monitor', 'start_up', 'tracking_nodes')
 """Those that need ROS."""
 
 RESULTS = Path(__file__).parent / 'results.md'
@@ -93,6 +94,7 @@ def _options() -> Namespace:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument('only', nargs='*', choices=[*BENCHMARKS, []], help='all by default')
     parser.add_argument('--seconds', type=float, default=60.0, help='of each run in real time')
+    parser.add_argument('--speed', type=float, default=1.0, help='of time in tracking_nodes')
     parser.add_argument('--domain', type=int, default=101, help='ROS domain')
     parser.add_argument('--output', type=Path, default=RESULTS, help='file for the tables')
     return parser.parse_args()

@@ -110,6 +110,14 @@ class Process:
         self._popen.send_signal(signal_number)
         return self._popen.wait(timeout)
 
+    def pause(self) -> None:
+        """Stop it where it is, until `resume`."""
+        self._popen.send_signal(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on."""
+        self._popen.send_signal(signal.SIGCONT)
+
     def kill(self) -> None:
         """End it at once, with whatever it has started."""
         with suppress(ProcessLookupError):

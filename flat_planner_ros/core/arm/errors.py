@@ -108,24 +108,33 @@ class UncertifiedLoop(FlatPlannerError):
         At which its slowest deviation dies away, negative if it grows [1/s].
     factors
         On stiffness, damping and inertia of the worst arm [-].
+    bandwidth
+        Largest one that would do [rad/s], 0 if there is none.
 
     """
 
     def __init__(
-        self, margin: float, bound: float, decay_rate: float, factors: tuple[float, float, float]
+        self,
+        margin: float,
+        bound: float,
+        decay_rate: float,
+        factors: tuple[float, float, float],
+        bandwidth: float = 0.0,
     ) -> None:
         """Keep the numbers, so that a caller can report them."""
         k, c, inertia = factors
         found = f'its margin is {margin:.3g}' if decay_rate > 0.0 else 'it is unstable'
+        lower = f'lower bandwidth to {bandwidth:.3g} rad/s, lower' if bandwidth else 'lower'
         super().__init__(
             f'loop refused: with stiffness, damping and inertia times {k:g}, {c:g} and '
             f'{inertia:g} {found} (slowest decay {decay_rate:.3g} 1/s); a margin of {bound:g} is '
-            'asked for; lower bandwidth, delay or uncertainty, or raise rate'
+            f'asked for; {lower} delay or uncertainty, or raise rate'
         )
         self.margin = margin
         self.bound = bound
         self.decay_rate = decay_rate
         self.factors = factors
+        self.bandwidth = bandwidth
 
 
 class InvalidCommand(FlatPlannerError):

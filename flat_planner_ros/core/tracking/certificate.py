@@ -21,11 +21,12 @@ last two have such a loop of their own, as far as computed torque knows the arm.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import product
 from math import ceil, log
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedLoop
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm, UncertifiedLoop
 from flat_planner_ros.core.tracking.chain import Chain, last_links, linearised_joint
 from flat_planner_ros.core.tracking.gains import feedback_gain, observer_gain
 from flat_planner_ros.core.tracking.settings import TrackerSettings
@@ -37,8 +38,20 @@ ROUNDING = 1e-9
 FREQUENCIES = 200
 """Frequencies of a response, from SLOWEST to half the rate, evenly in logarithm."""
 
+CHOICE = 0.02
+"""Step in which a bandwidth is chosen, relative to the one asked for [-]."""
+
+MOST_LATE = 20
+"""Samples by which efforts are late at most when it is looked how late they may be."""
+
+KEPT = 64
+"""Chains and gains that are remembered: those of one box."""
+
 SLOWEST = 1e-2
 """Lowest frequency of a response, relative to the bandwidth [-]."""
+
+
+_Case = tuple[tuple[float, float, float], Chain, Chain]
 
 
 class Certificate(NamedTuple):
@@ -47,6 +60,11 @@ class Certificate(NamedTuple):
 
     Attributes
     ----------
+    bandwidth
+        Frequency of the closed loop's poles [rad/s].
+    late
+        By how much later than known efforts may act without an unstable loop for any arm of the
+        box, in whole samples [s].
     decay_rate
         At which the slowest deviation dies away [1/s].
     margin
@@ -56,6 +74,8 @@ class Certificate(NamedTuple):
 
     """
 
+    bandwidth: float
+    late: float
     decay_rate: float
     margin: float
     worst: tuple[float, float, float]
@@ -65,8 +85,9 @@ class Certificate(NamedTuple):
         """Return it in words."""
         k, c, inertia = self.worst
         return (
-            f'slowest decay {self.decay_rate:.3g} 1/s, margin {self.margin:.3g} with stiffness, '
-            f'damping and inertia times {k:g}, {c:g} and {inertia:g}'
+            f'bandwidth {self.bandwidth:.3g} rad/s, slowest decay {self.decay_rate:.3g} 1/s, '
+            f'margin {self.margin:.3g} with stiffness, damping and inertia times {k:g}, {c:g} and '
+            f'{inertia:g}; stable where efforts act up to {1e3 * self.late:.3g} ms late'
         )
 
 
@@ -101,13 +122,11 @@ class SampledLoop:
     ) -> None:
         """Compute the gains."""
         period, m = settings.period, true.order
-        transition, effect = true.over(period)
+        transition, effect = _flow(true, period)
         self._true = transition[:m, :m], effect[:m, None]
-        self._flow, effect = model.over(period)
+        self._flow, effect = _flow(model, period)
         self._effect = effect[:, None]
-        gain = feedback_gain(model, period, bandwidth, settings.damping)
-        self._gain = np.append(gain, 1.0)[None]
-        self._correction = observer_gain(model, period, settings.observer_ratio * bandwidth)
+        self._gain, self._correction = _gains(model, settings, bandwidth)
         self._angles, self._order, self._late = model.angles, m, late
         self._delay = ceil(settings.delay / period - ROUNDING)
         self._size = 2 * m + 1 + self._delay + late
@@ -152,9 +171,29 @@ class SampledLoop:
         return np.vstack(following), given
 
 
+@lru_cache(maxsize=KEPT)
+def _flow(chain: Chain, period: float) -> tuple[FloatArray, FloatArray]:
+    """Return what a chain, known by being this very one, does in a period [s]."""
+    return chain.over(period)
+
+
+@lru_cache(maxsize=KEPT)
+def _gains(
+    model: Chain, settings: TrackerSettings, bandwidth: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the gains of the feedback, with the disturbance, and of the observer."""
+    period = settings.period
+    gain = feedback_gain(model, period, bandwidth, settings.damping)
+    correction = observer_gain(model, period, settings.observer_ratio * bandwidth)
+    return np.append(gain, 1.0)[None], correction
+
+
 def certify(arm: PlanarArm, settings: TrackerSettings) -> Certificate:
     """
     Return the certificate of the loop for an arm.
+
+    With a bandwidth in terms of the free oscillation's frequency it is of the fastest loop up to
+    that one that has the margin.
 
     Raises
     ------
@@ -164,24 +203,64 @@ def certify(arm: PlanarArm, settings: TrackerSettings) -> Certificate:
         As the gains raise them.
 
     """
-    bandwidth, period = settings.bandwidth_of(arm), settings.period
+    asked, cases = settings.bandwidth_of(arm), list(_cases(arm, settings))
+    worst = _worst(cases, settings, asked)
+    if worst.margin < settings.margin:
+        slower = _fastest(cases, settings, asked)
+        if settings.bandwidth or slower is None:
+            raise UncertifiedLoop(
+                worst.margin,
+                settings.margin,
+                worst.decay_rate,
+                worst.worst,
+                0.0 if slower is None else slower.bandwidth,
+            )
+        worst = slower
+    return worst._replace(late=_stable_delay(cases, settings, worst.bandwidth))
+
+
+def _worst(cases: list[_Case], settings: TrackerSettings, bandwidth: float) -> Certificate:
+    """Return the least margin and the slowest decay of all cases for a bandwidth [rad/s]."""
+    period = settings.period
     frequencies = np.geomspace(SLOWEST * bandwidth, np.pi / period, FREQUENCIES)
     found = []
-    for factors, true, model in _cases(arm, settings):
+    for factors, true, model in cases:
         for late in {0, settings.uncertainty.samples}:
             loop = SampledLoop(true, model, settings, bandwidth, late)
             decay = -log(loop.radius) / period
             margin = loop.margin(frequencies, period) if decay > 0.0 else 0.0
-            found.append(Certificate(decay, margin, factors))
+            found.append(Certificate(bandwidth, 0.0, decay, margin, factors))
     worst = min(found, key=lambda case: case.margin)
-    if worst.margin < settings.margin:
-        raise UncertifiedLoop(worst.margin, settings.margin, worst.decay_rate, worst.worst)
     return worst._replace(decay_rate=min(case.decay_rate for case in found))
 
 
-def _cases(
-    arm: PlanarArm, settings: TrackerSettings
-) -> Iterator[tuple[tuple[float, float, float], Chain, Chain]]:
+def _fastest(cases: list[_Case], settings: TrackerSettings, most: float) -> Certificate | None:
+    """Return the certificate of the fastest loop below a bandwidth [rad/s], if there is one."""
+    low, high, best = 0.0, most, None
+    while high - low > CHOICE * most:
+        middle = low + 0.5 * (high - low)
+        try:
+            found = _worst(cases, settings, middle)
+        except InvalidRequest:  # slower than the arm itself
+            low = middle
+            continue
+        if found.margin >= settings.margin:
+            low, best = middle, found
+        else:
+            high = middle
+    return best
+
+
+def _stable_delay(cases: list[_Case], settings: TrackerSettings, bandwidth: float) -> float:
+    """Return by how much later than known efforts may act, up to MOST_LATE samples [s]."""
+    for late in range(1, MOST_LATE + 1):
+        loops = (SampledLoop(true, own, settings, bandwidth, late) for _, true, own in cases)
+        if any(loop.radius >= 1.0 for loop in loops):
+            return (late - 1) * settings.period
+    return MOST_LATE * settings.period
+
+
+def _cases(arm: PlanarArm, settings: TrackerSettings) -> Iterator[_Case]:
     """Return factors on the model, true chain and model for the corners and the centre."""
     box = settings.uncertainty
     widths = (box.stiffness, box.damping, box.inertia)

@@ -64,9 +64,10 @@ class TrackerSettings:
     delay
         From the moment an effort is computed until it acts [s].
     bandwidth
-        Frequency of the closed loop's poles [rad/s]; 0 for `relative_bandwidth`.
+        Frequency of the closed loop's poles [rad/s]; 0 for one by `relative_bandwidth`.
     relative_bandwidth
-        The same in terms of the free oscillation's frequency [-].
+        The same in terms of the free oscillation's frequency, or less where the margin asks for a
+        slower loop [-].
     damping
         Damping ratio of these poles [-], at least 0.71.
     observer_ratio
@@ -79,6 +80,9 @@ class TrackerSettings:
         Largest effort of each actuated joint [N m], one number for all or one for each.
     timeout
         Age of the joint samples at which it gives up [s].
+    max_age
+        Age of the joint samples on average, when they are used, at which it gives up [s]; 0 for as
+        late as efforts may act by the certificate.
     jump
         Difference of a sample from what was expected at which it gives up [rad].
     max_error
@@ -97,11 +101,12 @@ class TrackerSettings:
     bandwidth: float = 0.0
     relative_bandwidth: float = 1.5
     damping: float = 0.75
-    observer_ratio: float = 5.0
+    observer_ratio: float = 4.0
     uncertainty: Uncertainty = Uncertainty()
     margin: float = 0.2
     effort_limit: tuple[float, ...] = (inf,)
     timeout: float = 0.05
+    max_age: float = 0.0
     jump: float = 0.2
     max_error: float = 1.0
     saturation_timeout: float = 0.5
@@ -114,7 +119,7 @@ class TrackerSettings:
             self._check(name, isfinite(getattr(self, name)) and getattr(self, name) > 0.0, '> 0')
         for name in ('timeout', 'jump', 'max_error', 'saturation_timeout'):
             self._check(name, getattr(self, name) > 0.0, '> 0')
-        for name in ('delay', 'bandwidth', 'ramp'):
+        for name in ('delay', 'bandwidth', 'max_age', 'ramp'):
             self._check(name, 0.0 <= getattr(self, name) < inf, '>= 0 and finite')
         self._check('margin', 0.0 < self.margin < 1.0, 'between 0 and 1')
         self._check('effort_limit', all(limit > 0.0 for limit in self.effort_limit), '> 0')
@@ -125,7 +130,7 @@ class TrackerSettings:
         return 1.0 / self.rate
 
     def bandwidth_of(self, arm: PlanarArm) -> float:
-        """Return the frequency of the closed loop's poles for an arm [rad/s]."""
+        """Return the largest frequency of the closed loop's poles for an arm [rad/s]."""
         return self.bandwidth or self.relative_bandwidth * arm.natural_mode().frequency
 
     def limits_of(self, arm: PlanarArm) -> FloatArray:

@@ -40,14 +40,20 @@ class Command(NamedTuple):
         Within their limits, shape (n-1,) [N m].
     is_clipped
         Whether more was asked for.
-    error
-        Largest distance of an angle from the plan [rad].
+    errors
+        Angles of all joints but n-1, in the place of which link n-1 stands, from the plan,
+        shape (n,) [rad].
 
     """
 
     efforts: FloatArray
     is_clipped: bool
-    error: float
+    errors: FloatArray
+
+    @property
+    def error(self) -> float:
+        """Return the largest distance of an angle from the plan [rad]."""
+        return float(np.abs(self.errors).max())
 
 
 class StateFeedback:
@@ -107,7 +113,7 @@ class StateFeedback:
         if is_clipped:
             accelerations = self.observer.accelerations(state, given - friction)
         self.observer.note(time, float(given[-1] - friction[-1]), accelerations)
-        return Command(given, is_clipped, distance(state, planned))
+        return Command(given, is_clipped, _errors(state, planned))
 
     def _effort(self, state: Estimate, planned: Reference, middle: Reference) -> float:
         """Return the effort of joint n-1 without friction [N m]."""
@@ -139,8 +145,13 @@ class StateFeedback:
 
 def distance(state: Estimate, planned: Reference) -> float:
     """Return the largest distance of a joint or of link n-1 from where it should be [rad]."""
+    return float(np.abs(_errors(state, planned)).max())
+
+
+def _errors(state: Estimate, planned: Reference) -> FloatArray:
+    """Return by how much the angles are beside where they should be, shape (n,) [rad]."""
     wanted = np.append(planned.positions[:-2], links_of(planned.positions))
-    return float(np.abs(state.angles - wanted).max())
+    return state.angles - wanted
 
 
 def _links_state(reference: Reference) -> FloatArray:

@@ -19,6 +19,7 @@ It is idle until its first command. What it does not understand ends in efforts 
 along a straight line in time, one reason, and idleness until the next command.
 """
 
+from dataclasses import replace
 from enum import Enum
 from math import inf, pi, remainder, tau
 
@@ -28,6 +29,7 @@ from flat_planner_ros.core.tracking.certificate import certify
 from flat_planner_ros.core.tracking.settings import TrackerSettings
 from flat_planner_ros.core.tracking.state_feedback import distance, StateFeedback
 from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion
+from flat_planner_ros.core.tracking.watches import AgeWatch, GrowthWatch
 import numpy as np
 
 EARLY = 0.5
@@ -72,6 +74,9 @@ class Tracker:
     def __init__(self, arm: PlanarArm, settings: TrackerSettings) -> None:
         """Compute and certify the gains; be idle."""
         self.certificate = certify(arm, settings)
+        settings = replace(settings, bandwidth=self.certificate.bandwidth)
+        self._max_age = settings.max_age or max(self.certificate.late, settings.period)
+        self.ages, self._growth = AgeWatch(settings.period), GrowthWatch(arm.n)
         self._settings, self._joints = settings, arm.n
         self._feedback = StateFeedback(arm, settings)
         self._observer = self._feedback.observer
@@ -106,6 +111,9 @@ class Tracker:
                 f'no joint sample for {now - self._heard:.3g} s, the timeout is '
                 f'{self._settings.timeout:g} s: the motion is not begun'
             )
+        if self.ages.mean > self._max_age:
+            raise InvalidCommand(f'{self._lateness}: the motion is not begun')
+        self.ages.restart()
         self._next = motion
 
     def is_moving(self, now: float) -> bool:
@@ -119,7 +127,7 @@ class Tracker:
         self._heard, self._sent, self._released = other._heard, other._sent, other._released
         self._efforts, self._last = other._efforts, other._last
         self._clipped_since, self.error = other._clipped_since, other.error
-        self._fault = other._fault
+        self._fault, self.ages = other._fault, other.ages
 
     def release(self, now: float, fault: str = '') -> None:
         """Let the effort go to zero and be idle until the next command; for a fault, say why."""
@@ -164,6 +172,8 @@ class Tracker:
             self._give_up(now, f'a joint sample is not finite: {sample.positions.tolist()} rad')
         elif sample.time > self._heard or sample.time < self._heard - self._settings.timeout:
             self._measure(sample, now)
+            if self.ages.mean > self._max_age:
+                self._give_up(now, self._lateness)
         return self._act(now)
 
     def watch(self, now: float) -> FloatArray | None:
@@ -176,6 +186,15 @@ class Tracker:
         """Return the estimate for a time [s]."""
         return self._observer.predicted(time)
 
+    @property
+    def _lateness(self) -> str:
+        """Return in words how late the loop is."""
+        return (
+            f'joint samples are {1e3 * self.ages.mean:.3g} ms old when they are used, beyond '
+            f'{1e3 * self._max_age:.3g} ms; if efforts act as late, the loop may be unstable: '
+            'lower bandwidth, or see what keeps this machine busy or its clock apart'
+        )
+
     def _measure(self, sample: JointSample, now: float) -> None:
         """Correct the estimate, or start it anew where it has nothing to do with the sample."""
         limit, gap = self._settings.jump, sample.time - self._heard
@@ -184,6 +203,7 @@ class Tracker:
             self._give_up(now, f'no joint sample for {gap:.3g} s')
             self._observer.restart(sample)
             return
+        self.ages.note(now - sample.time, gap)
         surprise = self._observer.correct(sample)
         if self.phase is Phase.IDLE and surprise > pi and abs(remainder(surprise, tau)) <= limit:
             # Turns are counted from those of the motion that is to begin.
@@ -226,6 +246,8 @@ class Tracker:
                 return
             self._observer.forget_disturbances()
         self._motion, self._next = self._next, None
+        if self.phase is not Phase.TRACKING:
+            self._growth = GrowthWatch(self._joints)
         self.phase = Phase.TRACKING
 
     def _track(self, time: float, now: float, motion: TrackedMotion) -> None:
@@ -236,11 +258,13 @@ class Tracker:
         command = self._feedback.command(time, motion)
         self.error, limit = command.error, self._settings.max_error
         self._clipped_since = min(self._clipped_since, now) if command.is_clipped else inf
-        clipped = now - self._clipped_since
+        clipped, grown = now - self._clipped_since, self._growth.note(command.errors)
         if not command.error <= limit:
             self._give_up(now, f'the arm is {command.error:.3g} rad from its plan')
         elif clipped > self._settings.saturation_timeout:
             self._give_up(now, f'an effort has been at its limit for {clipped:.3g} s')
+        elif grown:
+            self._give_up(now, f'its errors grow from swing to swing, to {grown:.3g} rad')
         else:
             self._efforts = command.efforts
 

@@ -169,14 +169,8 @@ class TrackerNode(GuardedNode):
 
     def _introduce(self) -> None:
         """Publish the present state."""
-        tracker = self._tracker
-        status = diagnostics.tracker_status(
-            tracker.phase.value,
-            tracker.error,
-            self._fault,
-            tracker.certificate,
-            self._rivals.seniority,
-        )
+        seniority = self._rivals.seniority
+        status = diagnostics.tracker_status(self._tracker, self._fault, seniority)
         status.hardware_id = self.get_fully_qualified_name()
         self._health.publish(diagnostics.array_of(status, self._now()))
 

@@ -28,7 +28,7 @@ from flat_planner_ros.core.monitor import (
 )
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, Shortfall
-from flat_planner_ros.core.tracking import Certificate
+from flat_planner_ros.core.tracking import Phase, Tracker
 from flat_planner_ros.ros.wire.interfaces import (
     ERROR_CODES,
     REPORT_NAME,
@@ -258,37 +258,38 @@ def monitor_status(
     )
 
 
-def tracker_status(
-    phase: str, error: float, fault: str, certificate: Certificate, seniority: str
-) -> DiagnosticStatus:
+def tracker_status(tracker: Tracker, fault: str, seniority: str) -> DiagnosticStatus:
     """
     Return the present state of a tracker.
 
     Parameters
     ----------
-    phase
-        What it does.
-    error
-        Distance of the arm from the plan while it tracks [rad].
+    tracker
+        What it does, its certificate, and how late it is.
     fault
         Why tracking was given up last, until the next command; empty if it was not.
-    certificate
-        Of its loop.
     seniority
         Which efforts it sends, and since when it lives.
 
     """
-    is_tracking = phase == 'tracking'
-    message = f'{phase}, {error:.3g} rad from the plan' if is_tracking else phase
+    phase, certificate, ages = tracker.phase.value, tracker.certificate, tracker.ages
+    error = tracker.error if tracker.phase is Phase.TRACKING else None
     values: Values = {
         'phase': phase,
-        'error': error if is_tracking else None,
+        'error': error,
         'decay_rate': certificate.decay_rate,
         'margin': certificate.margin,
+        'bandwidth': certificate.bandwidth,
+        'most_late': certificate.late,
+        'age': ages.mean,
+        'oldest': ages.oldest,
+        'unanswered': ages.unanswered,
         'seniority': seniority,
     }
-    level = DiagnosticStatus.ERROR if fault else DiagnosticStatus.OK
-    return status_msg(TRACKER_NAME, level, f'{phase}; {fault}' if fault else message, values)
+    if fault:
+        return status_msg(TRACKER_NAME, DiagnosticStatus.ERROR, f'{phase}; {fault}', values)
+    message = phase if error is None else f'{phase}, {error:.3g} rad from the plan'
+    return status_msg(TRACKER_NAME, DiagnosticStatus.OK, message, values)
 
 
 def _report_values(report: VibrationReport) -> Values:

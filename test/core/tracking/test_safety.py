@@ -14,6 +14,7 @@
 
 """What the tracker does not understand ends in efforts of zero, one reason, and idleness."""
 
+from collections import deque
 from dataclasses import replace
 from math import tau
 
@@ -139,6 +140,87 @@ def test_lasting_saturation_ends_the_motion(samples):
     assert_given_up(loop, 'at its limit')
 
 
+def old(samples):
+    """Return what spoils samples so that each is some samples old when it is used."""
+    waiting = deque()
+
+    def spoil(sample):
+        waiting.append(sample)
+        return waiting.popleft() if len(waiting) > samples else None
+
+    return spoil
+
+
+def test_samples_that_are_late_are_made_up_for_as_long_as_that_is_safe(samples):
+    """The loop knows their age; that of its efforts it does not."""
+    loop = moving(samples, late=1)
+    loop.run(0.3, old(2))
+    assert loop.tracker.phase is Phase.TRACKING
+    assert loop.tracker.ages.mean == pytest.approx(0.004, rel=0.3)
+    assert loop.tracker.ages.oldest == pytest.approx(0.004)
+    assert loop.tracker.error < 0.02
+    late = loop.tracker.certificate.late
+    loop.run(0.3, old(round(2.0 * late / loop.period)))
+    loop.run(0.15)
+    assert_given_up(loop, 'ms old when they are used')
+    for _ in range(120):
+        loop.tracker.hear(replace(loop.sample(), time=loop.arm.time - 0.02), loop.arm.time)
+        loop.arm.advance(loop.arm.time + loop.period)
+    again = motion_of(samples, start=loop.arm.time)
+    with pytest.raises(InvalidCommand, match='lower bandwidth'):
+        loop.tracker.follow(again, loop.arm.time)
+
+
+@pytest.mark.parametrize(('busy', 'is_too_late'), [(0.01, False), (0.03, True)])
+def test_a_machine_that_is_busy_ends_in_one_error_not_in_a_swing(busy, is_too_late):
+    """Samples come in bursts, and efforts with them; the arm is pushed meanwhile."""
+    loop = ClosedLoop(Tracker(ARM, SETTINGS), ARM, late=1)
+    loop.run(START)
+    still = samples_of(final=[0.2, 0.0])
+    loop.tracker.follow(motion_of(still, start=loop.arm.time), loop.arm.time)
+    loop.run(1.1)
+    end = loop.arm.time + 0.03
+    loop.push = lambda time: 0.1 if time < end else 0.0
+    faults, largest, waiting, wake = [], 0.0, [], 0.0
+    while loop.arm.time < 3.0:
+        now = loop.arm.time
+        waiting.append(loop.sample())
+        if now >= wake:
+            for sample in waiting:
+                efforts = loop.tracker.hear(sample, now)
+                loop.acting = loop.acting if efforts is None else efforts
+            waiting, wake = [], now + busy
+        loop.arm.hold(loop.acting + loop.push(now))
+        loop.arm.advance(now + loop.period)
+        faults.append(loop.tracker.take_fault())
+        if loop.tracker.phase is Phase.TRACKING:
+            largest = max(largest, loop.tracker.error)
+    assert largest < 0.4
+    assert (loop.tracker.phase is Phase.IDLE) == is_too_late
+    if not is_too_late:
+        assert not any(faults)
+        assert loop.tracker.error < 5e-3
+        return
+    (fault,) = filter(None, faults)
+    assert 'ms old' in fault or 'grow from swing to swing' in fault
+    assert not loop.acting.any()
+
+
+@pytest.mark.parametrize('late', [6, 7, 10])
+def test_efforts_that_act_late_end_in_one_error_before_the_swing_has_grown(late):
+    """Which no age of a sample shows."""
+    loop = ClosedLoop(Tracker(ARM, SETTINGS), ARM, late=late)
+    loop.run(START)
+    still = samples_of(final=[0.2, 0.0])
+    loop.tracker.follow(motion_of(still, start=loop.arm.time), loop.arm.time)
+    loop.run(1.1)
+    end = loop.arm.time + 0.03
+    loop.push = lambda time: 0.02 if time < end else 0.0
+    loop.run(2.0)
+    assert np.abs(np.array(loop.efforts)).max() < 1.0
+    assert_given_up(loop, 'grow from swing to swing')
+
+
 def test_a_diverging_error_ends_the_motion(samples):
     loop = ClosedLoop(
         Tracker(ARM, replace(SETTINGS, max_error=0.1)), ARM.scaled(inertia=3.0), saturation=[0.004]
@@ -187,7 +269,7 @@ def test_a_motion_follows_another_without_a_step(samples):
 
 
 def test_without_hold_the_arm_is_let_go(samples):
-    loop = ClosedLoop(Tracker(ARM, replace(SETTINGS, hold=False)), ARM)
+    loop = ClosedLoop(Tracker(ARM, replace(SETTINGS, hold=False)), ARM, late=1)
     loop.run(START)
     loop.tracker.follow(motion_of(samples, start=START), START)
     loop.run(1.2)

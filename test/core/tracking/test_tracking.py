@@ -99,21 +99,20 @@ def test_the_swing_at_the_end_is_half_of_what_no_feedback_leaves(plan_of_paper, 
     assert envelope(true, errors[end, 1], rate) < 0.5 * free
 
 
-@pytest.mark.parametrize('rate', [250.0, 1000.0])
+@pytest.mark.parametrize(('rate', 'within'), [(200.0, 0.65), (1000.0, 0.35)])
 @pytest.mark.parametrize('late', [1, 2])
-def test_other_rates_and_delays(plan_of_paper, rate, late):
-    settings = replace(SETTINGS, rate=rate, delay=late / rate, margin=0.1)
+def test_other_rates_and_delays(plan_of_paper, rate, within, late):
+    """At 200 Hz the fastest loop that is certified is slower than the one asked for."""
+    settings = replace(SETTINGS, rate=rate, delay=late / rate)
     times, errors, _, tracker = tracked(
         plan_of_paper, PLANT['k, c -10 %'], settings=settings, late=late, duration=1.8
     )
     assert tracker.phase is Phase.TRACKING
-    assert settling(times, errors, START + 1.0) <= 0.5
+    assert settling(times, errors, START + 1.0) <= within
 
 
 def test_noise_of_a_milliradian_stays_small(plan_of_paper):
-    _, errors, efforts, tracker = tracked(
-        plan_of_paper, ARM, noise=1e-3, settings=replace(SETTINGS, observer_ratio=4.0)
-    )
+    _, errors, efforts, tracker = tracked(plan_of_paper, ARM, noise=1e-3, settings=SETTINGS)
     assert tracker.phase is Phase.TRACKING
     assert np.abs(errors).max() < 5e-3
     assert np.abs(efforts).max() <= 2.0 * np.abs(plan_of_paper.efforts).max()
@@ -165,7 +164,7 @@ def test_an_arm_with_weight(factors):
     )
     assert tracker.phase is Phase.TRACKING
     assert settling(times, errors, START + 1.0) <= 0.4
-    assert (np.abs(efforts).max(axis=0) <= 1.6 * np.abs(samples.efforts).max(axis=0)[:3]).all()
+    assert (np.abs(efforts).max(axis=0) <= 1.5 * np.abs(samples.efforts).max(axis=0)[:3]).all()
 
 
 def test_known_friction_is_compensated(plan_of_paper):

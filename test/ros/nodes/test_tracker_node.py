@@ -36,7 +36,7 @@ PLANT = {
     'real_time_factor': 0.25,  # a busy machine has four times the time for a period
     'encoder.resolution': tau / 2**14,
 }
-TRACKER = {'use_sim_time': 'true', 'timeout': 0.2}
+TRACKER = {'use_sim_time': 'true', 'timeout': 0.2, 'max_age': 0.1}
 
 
 def arguments(values):
@@ -203,3 +203,23 @@ def test_a_motor_too_weak_for_the_motion_ends_in_one_error(graph):
     graph.expect(lambda: graph.logged('given up'), 'an error')
     (error,) = graph.logged('given up')
     assert 'rad from its plan' in error
+
+
+def test_a_tracker_that_is_held_up_again_and_again_lets_go_with_one_error(graph):
+    """A machine that is busy does no more to it than these signals."""
+    arm = Tracked(graph, **{'friction.coulomb': '[0.0005]'})
+    arm.tracker.kill()
+    arm.start_tracker(max_age=0.0)
+    arm.move(0.5)
+    for _ in range(50):
+        arm.tracker.pause()
+        arm.pass_time(0.08)
+        arm.tracker.resume()
+        arm.pass_time(0.02)
+        if graph.logged('ms old when they are used'):
+            break
+    graph.expect(lambda: graph.logged('ms old when they are used'), 'an error')
+    assert len(graph.logged('ms old when they are used')) == 1
+    assert max(abs(state.position[1]) for state in arm.states) < 0.3
+    arm.await_silence()
+    assert not any(state.effort[0] for state in arm.states[-10:])
