@@ -211,15 +211,18 @@ def test_a_tracker_that_is_held_up_again_and_again_lets_go_with_one_error(graph)
     arm.tracker.kill()
     arm.start_tracker(max_age=0.0)
     arm.move(0.5)
+    graph.expect(lambda: arm.states[-1].position[0] > 0.01, 'a motion')
     for _ in range(50):
         arm.tracker.pause()
         arm.pass_time(0.08)
         arm.tracker.resume()
         arm.pass_time(0.02)
-        if graph.logged('ms old when they are used'):
+        if graph.logged('given up'):
             break
-    graph.expect(lambda: graph.logged('ms old when they are used'), 'an error')
-    assert len(graph.logged('ms old when they are used')) == 1
-    assert max(abs(state.position[1]) for state in arm.states) < 0.3
+    graph.expect(lambda: graph.logged('given up'), 'an error')
     arm.await_silence()
+    # On a busy machine one hold-up alone may be too long: 'no joint sample for'.
+    (error,) = graph.logged('given up')
+    assert 'joint sample' in error
+    assert max(abs(state.position[1]) for state in arm.states) < 0.3
     assert not any(state.effort[0] for state in arm.states[-10:])
