@@ -16,6 +16,7 @@
 
 from argparse import Namespace
 from collections.abc import Iterator
+from dataclasses import replace
 from math import hypot, pi, tau
 from typing import NamedTuple
 
@@ -83,8 +84,10 @@ class Fault(NamedTuple):
 
     @property
     def arm(self) -> PlanarArm:
-        """Return the true arm without its friction."""
-        return arm().scaled(**self.factors)
+        """Return the true arm."""
+        viscous, coulomb = self.friction
+        true = arm().scaled(**self.factors)
+        return replace(true, viscous_friction=[viscous], coulomb_friction=[coulomb])
 
 
 FAULTS = {
