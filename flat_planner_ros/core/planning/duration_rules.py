@@ -109,6 +109,7 @@ class DurationRules:
         options: PlanningOptions,
         *,
         is_prescribed: bool,
+        first: float | None = None,
     ) -> tuple[Plan, LimitUse | None]:
         """
         Return the plan of a motion within the limits, and what stretched it.
@@ -120,6 +121,8 @@ class DurationRules:
         is_prescribed
             Whether the request's duration is what is wanted; else `factor` times the shortest that
             obeys the limits is.
+        first
+            Where the search for the shortest starts [s], if something is known of it.
 
         Returns
         -------
@@ -143,7 +146,7 @@ class DurationRules:
         limit = float(self.limits.effort[-2])
         if not is_prescribed:
             bound = shortest_known(request, arm, options, limit)
-            found = self._shortest(plan_of, self.shortest, bound=bound)
+            found = self._shortest(plan_of, self.shortest, bound=bound, first=first)
             return self._gentle(plan_of, found), None
         prescribed = plan(request, arm, options)
         use = self.limits.worst(prescribed)
@@ -193,6 +196,7 @@ class DurationRules:
         shortest: float,
         exceeded: LimitUse | None = None,
         bound: float | None = None,
+        first: float | None = None,
         most: int | None = None,
     ) -> Plan:
         """Return the shortest plan, or reject by what a prescribed one, or the best, exceeds."""
@@ -203,6 +207,7 @@ class DurationRules:
                 shortest=shortest,
                 longest=self.longest,
                 bound=bound,
+                first=first,
                 most=most,
             )
         except NoFeasibleDuration as error:

@@ -111,6 +111,7 @@ def shortest_plan(
     shortest: float,
     longest: float,
     bound: float | None = None,
+    first: float | None = None,
     most: int | None = None,
 ) -> Plan:
     """
@@ -126,6 +127,8 @@ def shortest_plan(
         Range of the duration [s].
     bound
         A duration below which none obeys [s], as some strategies know it; it is tried first.
+    first
+        Where the search starts without a bound [s]; None for the middle of the range.
     most
         Durations after which the search is content with what it has found; None for all that the
         answer needs.
@@ -151,9 +154,10 @@ def shortest_plan(
         raise InvalidRequest(f'no range of durations: {shortest:g} to {longest:g} s')
     enough = inf if most is None else most
     if bound is None or not shortest < bound < longest:
-        return _Search(plan_of, limits, shortest, longest, enough).run()
-    first = float(f'{bound:.{DIGITS}g}')
-    return _Search(plan_of, limits, first, longest, enough, is_bound=True).run()
+        start = sqrt(shortest * longest) if first is None else first
+        return _Search(plan_of, limits, shortest, longest, enough, start).run()
+    least = float(f'{bound:.{DIGITS}g}')
+    return _Search(plan_of, limits, least, longest, enough, least, is_bound=True).run()
 
 
 @dataclass(eq=False)
@@ -164,7 +168,8 @@ class _Search:
     limits: JointLimits
     shortest: float
     longest: float
-    most: float = inf
+    most: float
+    first: float
     is_bound: bool = False
     trials: dict[float, Trial] = field(default_factory=dict)
     peaks: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -254,8 +259,7 @@ class _Search:
     def _bracket(self) -> None:
         """Look, by samples, for one duration that seems to obey above one that does not."""
         stride = FIRST_STRIDE
-        first = self.shortest if self.is_bound else sqrt(self.shortest * self.longest)
-        trial = self._glance(first)
+        trial = self._glance(self.first)
         descends = trial.ratio <= 1.0
         while (trial.ratio <= 1.0) == descends:
             here = trial.duration

@@ -67,7 +67,7 @@ FLATTEST = 1e-6
 
 
 def with_via_times(
-    request: MotionRequest, arm: PlanarArm, options: PlanningOptions
+    request: MotionRequest, arm: PlanarArm, options: PlanningOptions, *, is_near: bool = False
 ) -> MotionRequest:
     """
     Return a request whose via points have the times at which the motion is cheapest.
@@ -76,9 +76,11 @@ def with_via_times(
     ----------
     request
         Points in their order, and the duration, which is kept; the times of the via points do not
-        matter.
+        matter, unless they are said to be near.
     arm, options
         As for `plan`.
+    is_near
+        Whether the times are those of another duration in proportion: the search goes on there.
 
     Raises
     ------
@@ -88,7 +90,7 @@ def with_via_times(
     """
     try:
         problem = problem_of(arm, options, request.duration)
-        edges = cheapest_edges(problem.cost, path_of(request, problem))
+        edges = cheapest_edges(problem.cost, path_of(request, problem), is_near=is_near)
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, 0.0) from error
     via = tuple(
@@ -98,7 +100,9 @@ def with_via_times(
     return replace(request, via=via)
 
 
-def cheapest_edges(cost: QuadraticCost, path: PathConditions) -> FloatArray:
+def cheapest_edges(
+    cost: QuadraticCost, path: PathConditions, *, is_near: bool = False
+) -> FloatArray:
     """
     Return edges of a path's segments that make it cheap: no small change of them is cheaper.
 
@@ -107,7 +111,9 @@ def cheapest_edges(cost: QuadraticCost, path: PathConditions) -> FloatArray:
     cost
         What is minimised.
     path
-        What is passed; of its edges, the last one alone matters.
+        What is passed; of its edges, the last one alone matters, unless they are near.
+    is_near
+        Whether the search starts from these edges.
 
     Returns
     -------
@@ -121,6 +127,10 @@ def cheapest_edges(cost: QuadraticCost, path: PathConditions) -> FloatArray:
     distances = np.linalg.norm(np.diff(path.values, prepend=path.start[:, :1], axis=1), axis=0)
     if not distances.any():
         return np.linspace(0.0, path.edges[-1], count + 1)
+    if is_near:
+        parts = np.diff(path.edges) / path.edges[-1] - LEAST_SHARE / count
+        guess = np.log(np.maximum(parts, np.finfo(float).eps))
+        return _minimum(cost, path, guess, GAIN_TOLERANCE).edges
     guess = GUESS_POWER * np.log(np.maximum(distances / distances.max(), LEAST_SHARE**2))
     guess[[0, -1]] += log(GUESS_AT_ENDS)
     plain = QuadraticCost(matrix=np.diag([0.0] * (len(cost.matrix) - 1) + [1.0]))

@@ -27,6 +27,7 @@ from flat_planner_ros.core.arm import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.planning import (
+    DurationRules,
     LimitUse,
     MotionRequest,
     Plan,
@@ -49,6 +50,9 @@ import numpy as np
 NOMINAL_DURATION = 1.0
 """Duration of a request before its own is found [s]."""
 
+ROUGH_TRIALS = 8
+"""Durations that are tried for one that tells the shares of via points."""
+
 SETTLING_TRIALS = 50
 """Durations that are tried at most until a motion to rest is sent: it is urgent."""
 
@@ -70,12 +74,25 @@ def plan_of_goal(
         if not via or goal.duration is not None:
             return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
         request = with_via_times(request, arm, options)
-        found, exceeded = rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
         if is_prescribed:
-            return found, exceeded
-        # The best shares of the time depend on the time, if little.
-        request = with_via_times(found.request, arm, options)
-        return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
+            return rules.plan_within(request, arm, options, is_prescribed=True)
+        # The best shares of the time depend on the time, if little: first it is found roughly.
+        rough = _rough_plan(rules, request, arm, options)
+        gentle = rough.request.stretched(min(rules.factor * rough.duration, rules.longest))
+        request = with_via_times(gentle, arm, options, is_near=True)
+        return rules.plan_within(request, arm, options, is_prescribed=False, first=rough.duration)
+
+
+def _rough_plan(
+    rules: DurationRules, request: MotionRequest, arm: PlanarArm, options: PlanningOptions
+) -> Plan:
+    """Return a plan of nearly the shortest duration, by few trials if they find one."""
+    try:
+        return rules.shortest_of(
+            lambda time: plan(request.stretched(time), arm, options), most=ROUGH_TRIALS
+        )
+    except RequestRejected:
+        return rules.plan_within(request, arm, options, is_prescribed=False)[0]
 
 
 def settling_plan(settings: SessionSettings, start: MotionStart, last: FloatArray | None) -> Plan:
