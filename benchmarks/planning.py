@@ -21,6 +21,7 @@ from typing import NamedTuple
 import warnings
 
 from flat_planner_ros.core import MotionRequest, Plan, plan, PlanarArm, PlanningOptions, Strategy
+from floor import array_operations
 from measurement import duration_text, Section, Timing, timing, verdict
 import numpy as np
 from peers import Peer, PEERS, Solver
@@ -189,7 +190,18 @@ def _own_section(rows: list[Row]) -> Section:
             f'{verdict(cold_met)}',
             f'new distance from the cached law, target {duration_text(CACHED_TARGET)}: '
             f'{verdict(cached_met)}',
+            _floor_note(rows[1].cold, _plan(Task(problem.request(), _KNOWN_ARM))),
         ],
+    )
+
+
+def _floor_note(cold: Timing, made: Plan) -> str:
+    """Return what the array operations of a cold plan cost by themselves."""
+    operations = array_operations(made)
+    floor = timing(lambda _: operations(), budget=0.5)
+    return (
+        f'the array operations of a cold plan with its samples alone: {duration_text(floor.best)} '
+        f'at best; the plan takes {cold.best / floor.best:.2f} times that'
     )
 
 
@@ -202,9 +214,14 @@ def _costs_section() -> Section:
             return answer(plan(task.request, task.arm, options))
 
         time = timing(step, new_task)
-        rows.append((name, *map(duration_text, (time.best, time.median, time.worst))))
+        operations = array_operations(plan(problem.request(), _KNOWN_ARM, options))
+        floor = timing(lambda _, operations=operations: operations(), budget=0.5)
+        times = map(duration_text, (time.best, time.median, time.worst, floor.best))
+        rows.append((name, *times, f'{time.best / floor.best:.2f}'))
     return Section(
-        'Cold plans with 1001 samples of other costs', ('cost', 'best', 'median', 'worst'), rows
+        'Cold plans with 1001 samples of other costs',
+        ('cost', 'best', 'median', 'worst', 'array operations alone', 'ratio of best'),
+        rows,
     )
 
 

@@ -86,8 +86,8 @@ class Spectrum:
     """
     Characteristic roots of an equation in one unit of time, clustered in any other.
 
-    In another unit all roots are multiples of themselves; only which are close together depends
-    on it. They are found once, and the clusters once for each grouping.
+    Other units multiply all roots; only which are close together depends on it. They are found
+    once, and the clusters once for each grouping.
 
     Parameters
     ----------
@@ -107,30 +107,30 @@ class Spectrum:
 
     def groupings(self, scales: FloatArray) -> list[bytes]:
         """Return what is the same for all factors, (s,), that make the same clusters of roots."""
-        keys = [APART] * len(scales)
-        close = np.flatnonzero(scales <= self._apart_beyond)
-        if len(close):
-            distances, bridged = self._distances
-            reach = np.maximum((LINK / scales[close])[:, None, None], bridged)
-            for i, linked in zip(close.tolist(), distances <= reach, strict=True):
-                keys[i] = linked.tobytes()
-        return keys
+        linked, apart = self._linked(scales[:, None, None]), scales > self._apart_beyond
+        pairs = zip(apart.tolist(), linked, strict=True)
+        return [APART if is_apart else link.tobytes() for is_apart, link in pairs]
 
     def clusters(self, scale: float = 1.0) -> list[Cluster]:
         """Return the clusters of all roots multiplied by a positive factor."""
-        is_apart = scale > self._apart_beyond
-        return self.grouped(APART if is_apart else self.groupings(np.array([scale]))[0], scale)
+        key = APART if scale > self._apart_beyond else self._linked(scale).tobytes()
+        return self.grouped(key, scale)
 
     def grouped(self, key: bytes, scale: float) -> list[Cluster]:
         """Return clusters of a grouping, of all roots multiplied by a positive factor."""
         if key == APART:
-            central = Cluster(centre=0j, factor=_monomial(2 * self._zeros))
-            return [central, *(Cluster(scale * b, _monomial(1)) for b in self._alone or ())]
+            alone = [Cluster(scale * beta, _monomial(1)) for beta in self._alone or ()]
+            return [Cluster(0j, _monomial(2 * self._zeros)), *alone]
         if key not in self._grouped:
             linked = np.frombuffer(key, dtype=np.bool_).reshape(self._distances[0].shape)
             self._grouped[key] = self._of_groups(linked)
         found = self._grouped[key]
         return list(found) if scale == 1.0 else [cluster.scaled(scale) for cluster in found]
+
+    def _linked(self, scale: float | FloatArray) -> BoolArray:
+        """Tell which roots share a cluster, the mirror images included, shape (..., 12, 12)."""
+        distances, bridged = self._distances
+        return np.asarray(distances <= np.maximum(LINK / scale, bridged))
 
     @cached_property
     def _beta(self) -> ComplexArray:
@@ -361,9 +361,8 @@ def _roots(factor: list[complex]) -> list[complex]:
     """Return the roots of a factor; those of a real one come in exact conjugate pairs."""
     if len(factor) == 2:
         return [-factor[1]]
-    ascending = np.array(factor[::-1])
-    is_real = not ascending.imag.any()
-    roots: list[complex] = _companion_roots(ascending.real if is_real else ascending).tolist()
+    full = np.array(factor[::-1])
+    roots: list[complex] = _companion_roots(full if full.imag.any() else full.real).tolist()
     return roots
 
 

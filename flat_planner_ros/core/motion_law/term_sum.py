@@ -22,7 +22,6 @@ matrix product gives every derivative at every time; the others are summed one b
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
@@ -228,7 +227,6 @@ class TermSums:
         return [TermSum(decays=d, factors=f, others=others) for d, f, others in parts]
 
 
-@np.errstate(under='ignore')
 def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray) -> FloatArray:
     """
     Return sums of terms, and their derivatives in x, without those that are neither.
@@ -249,14 +247,15 @@ def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray)
     """
     count, places = decays.shape[-1], distances.shape[1]
     basis = np.empty((*decays.shape[:-1], factors.shape[-1], places))
-    if count:
-        # Far from its end an exponential vanishes: this underflow is the right answer.
-        fall = -decays[..., None, None] * distances
-        np.exp(fall, out=fall)
-        _split(fall, basis[..., : 4 * count, :].reshape(*decays.shape, 2, 2, places))
-    rows = basis.swapaxes(-2, 0)
-    _fill_powers(rows[4 * count :], 0.5 * (distances[0] - distances[1]))
-    sums: FloatArray = factors @ basis
+    # Far from its end an exponential vanishes: this underflow is the right answer.
+    with np.errstate(under='ignore'):
+        if count:
+            fall = -decays[..., None, None] * distances
+            np.exp(fall, out=fall)
+            _split(fall, basis[..., : 4 * count, :].reshape(*decays.shape, 2, 2, places))
+        rows = basis.swapaxes(-2, 0)
+        _fill_powers(rows[4 * count :], 0.5 * (distances[0] - distances[1]))
+        sums: FloatArray = factors @ basis
     return sums
 
 
@@ -332,8 +331,12 @@ def _odd_signs(orders: int) -> FloatArray:
 def _fill_powers(table: FloatArray, x: FloatArray) -> None:
     """Write 1, x, x^2, ... into rows."""
     table[:1] = 1.0
-    for lower, higher in pairwise(table):
-        np.multiply(lower, x, out=higher)
+    table[1:2] = x
+    known = 2
+    while known < len(table):
+        more = min(known - 1, len(table) - known)
+        np.multiply(table[1 : 1 + more], table[known - 1], out=table[known : known + more])
+        known += more
 
 
 def _split(fall: ComplexArray, parts: FloatArray) -> None:
