@@ -22,6 +22,8 @@ from flat_planner_ros.core.monitor.adoption import (
     ReportedEstimate,
     ReportedModel,
 )
+from flat_planner_ros.core.monitor.drift import DriftWatch, ParameterDrift
+from flat_planner_ros.core.monitor.drift_settings import DriftSettings
 from flat_planner_ros.core.monitor.feedback_times import FeedbackTimes
 from flat_planner_ros.core.monitor.identification import (
     ActuatedJoints,
@@ -39,6 +41,8 @@ __all__ = [
     'ActuatedJoints',
     'Adoption',
     'AdoptionRefused',
+    'DriftSettings',
+    'DriftWatch',
     'Estimate',
     'FeedbackTimes',
     'fit_oscillation',
@@ -50,6 +54,7 @@ __all__ = [
     'ModelTuner',
     'MonitorSettings',
     'OscillationFit',
+    'ParameterDrift',
     'Phase',
     'PlannedMotion',
     'ReportedEstimate',

@@ -24,6 +24,7 @@ from flat_planner_ros.core.arm import (
     JointStateRules,
     PlanarArm,
 )
+from flat_planner_ros.core.monitor.drift_settings import DriftSettings
 from flat_planner_ros.core.monitor.identification import ActuatedJoints
 
 UNITS = {
@@ -85,6 +86,8 @@ class MonitorSettings:
     fits_model
         Whether the whole model of the last two links is fitted to each motion; takes a second or
         two of the processor.
+    drift
+        When the arm is said to age.
 
     """
 
@@ -101,6 +104,7 @@ class MonitorSettings:
     arm: PlanarArm | None = None
     actuated_joints: ActuatedJoints = ActuatedJoints.AUTO
     fits_model: bool = False
+    drift: DriftSettings = DriftSettings()  # noqa: RUF009  A frozen value.
 
     def __post_init__(self) -> None:
         """Refuse settings without meaning."""

@@ -136,6 +136,8 @@ class LiveNode(GuardedNode):
         listen(JointTrajectory, plan, self._on_plan, interfaces.LATCHED)
         listen(DiagnosticArray, status, self._verdicts.hear, history)
         listen(DiagnosticArray, report, self._on_report, interfaces.LATCHED)
+        drift = interfaces.topic_of(interfaces.MONITOR, interfaces.MODEL_DRIFT)
+        listen(DiagnosticArray, drift, self._on_drift, interfaces.LATCHED)
         listen(DiagnosticArray, interfaces.DIAGNOSTICS, self._on_diagnostics, interfaces.RELIABLE)
 
     def _receiver(self, stream: str) -> Callable[[bytes], None]:
@@ -198,6 +200,11 @@ class LiveNode(GuardedNode):
                 time = report['values'].get(f'{key}_time')
                 report[key] = None if time is None else self._relative(float(time))
             self.feed.put('report', report)
+
+    def _on_drift(self, msg: DiagnosticArray) -> None:
+        """Tell how the arm ages."""
+        for status in msg.status:
+            self.feed.put('drift', state_of(status))
 
     def _on_diagnostics(self, msg: DiagnosticArray) -> None:
         """Tell what the tracker of this namespace does, if there is one."""

@@ -21,6 +21,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from flat_planner_ros.core.arm import Drive, FlatPlannerError, JointSample
 from flat_planner_ros.core.monitor import (
+    DriftWatch,
     MonitorSettings,
     PlannedMotion,
     VibrationMonitor,
@@ -38,6 +39,7 @@ from flat_planner_ros.ros.parameters.monitor import build, ROWS
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, diagnostics, estimates, interfaces, stamps
+from flat_planner_ros.ros.wire.drift_status import drift_status
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.tracker_word import hear_tracker
 from rclpy.clock import Clock, ClockType
@@ -72,6 +74,9 @@ class MonitorNode(GuardedNode):
         )
         self._reports = self.create_publisher(
             DiagnosticArray, interfaces.REPORT, interfaces.LATCHED
+        )
+        self._drifts = self.create_publisher(
+            DiagnosticArray, interfaces.MODEL_DRIFT, interfaces.LATCHED
         )
         self._health = self.create_publisher(
             DiagnosticArray, interfaces.DIAGNOSTICS, interfaces.RELIABLE
@@ -120,6 +125,8 @@ class MonitorNode(GuardedNode):
     def _forget(self) -> None:
         """Wait for a plan, as at the start."""
         self._monitor.reset()
+        self._drift = DriftWatch()
+        self._drifting = False
         self._stamps = StampClock()
         self._reader: JointStateReader | None = None
         self._plan: PlannedMotion | None = None
@@ -231,6 +238,18 @@ class MonitorNode(GuardedNode):
                 self._log.info(status.message)
             else:
                 self._log.warning(status.message)
+            self._watch_drift(report)
+
+    def _watch_drift(self, report: VibrationReport) -> None:
+        """Publish how the arm ages, where a report tells, and say once that it does."""
+        drifts = self._drift.hear(report, self._monitor.settings.drift)
+        if not drifts:
+            return
+        status = drift_status(drifts)
+        self._drifts.publish(diagnostics.array_of(status, self._stamps.now(self._now())))
+        former, self._drifting = self._drifting, status.level != DiagnosticStatus.OK
+        if self._drifting and not former:
+            self._log.warning(status.message)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -17,7 +17,7 @@
 from math import pi
 
 from flat_planner_ros.core.arm import Drive, PlanarArm
-from flat_planner_ros.core.monitor import ActuatedJoints, MonitorSettings
+from flat_planner_ros.core.monitor import ActuatedJoints, DriftSettings, MonitorSettings
 from flat_planner_ros.ros.parameters.arm_model import arm_of, MODEL_ROWS
 from flat_planner_ros.ros.parameters.joint_states import JOINT_STATE_ROWS, joint_state_rules
 from flat_planner_ros.ros.parameters.row import (
@@ -94,6 +94,22 @@ ROWS = [
         'estimate inertias, spring, damper and friction of the last two links from each motion',
         'needs measured efforts, and a second or two of the processor after each motion',
     ),
+    Row(
+        'drift.window',
+        DriftSettings.window,
+        '',
+        'motions over which the estimates are watched for an arm that ages',
+        lower=20,
+        upper=10000,
+    ),
+    Row(
+        'drift.false_alarms',
+        DriftSettings.false_alarms,
+        '',
+        'share of the motions after which an arm that does not age is suspected at most',
+        lower=1e-9,
+        upper=0.1,
+    ),
 ]
 """All parameters of the monitor node."""
 
@@ -131,6 +147,9 @@ def build(values: Values) -> MonitorSettings:
         actuated_joints=ActuatedJoints(values['actuated_joints']),
         # A position drive has no say in the efforts: only ratios to the inertia I*_n are told.
         fits_model=values['fit_model'] and Drive(values['drive']) is Drive.EFFORT,
+        drift=DriftSettings(
+            window=values['drift.window'], false_alarms=values['drift.false_alarms']
+        ),
     )
 
 

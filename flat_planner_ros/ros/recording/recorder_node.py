@@ -60,6 +60,7 @@ OURS = {
     interfaces.MONITOR: {
         interfaces.RESIDUAL: (JOINT_STATE, interfaces.RELIABLE),
         interfaces.REPORT: (DIAGNOSTIC_ARRAY, interfaces.LATCHED),
+        interfaces.MODEL_DRIFT: (DIAGNOSTIC_ARRAY, interfaces.LATCHED),
     },
     interfaces.TRACKER: {
         interfaces.EFFORT_COMMANDS: ('std_msgs/msg/Float64MultiArray', interfaces.RELIABLE),

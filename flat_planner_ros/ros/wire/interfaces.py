@@ -53,10 +53,12 @@ PUSH = '~/push'
 RELEASE = '~/release'
 RESIDUAL = '~/residual'
 REPORT = '~/report'
+MODEL_DRIFT = '~/model_drift'
 
 STATUS_NAME = 'flat_planner: goal'
 MODEL_NAME = 'flat_planner: model'
 REPORT_NAME = 'flat_monitor: residual oscillation'
+DRIFT_NAME = 'flat_monitor: model drift'
 TRACKER_NAME = 'flat_tracker: tracking'
 
 RELIABLE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)

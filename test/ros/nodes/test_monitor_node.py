@@ -77,18 +77,19 @@ def plan_msg(start=START, duration=DURATION, goal=GOAL, joints=JOINTS):
     return msg
 
 
-def swing(elapsed, amplitude=AMPLITUDE):
+def swing(elapsed, amplitude=AMPLITUDE, frequency=FREQUENCY):
     """Return the oscillation of joint 2 at a time after the motion [rad]."""
-    phase = 2 * pi * FREQUENCY * elapsed
+    phase = 2 * pi * frequency * elapsed
     return amplitude * exp(-DECAY * elapsed) * cos(phase) if elapsed >= 0.0 else 0.0
 
 
-def state_msg(time, start=START, goal=GOAL, amplitude=AMPLITUDE):
+def state_msg(time, start=START, goal=GOAL, amplitude=AMPLITUDE, frequency=FREQUENCY):
     """Return the planned state until, a free oscillation of joint 2 after the end."""
     s = min(max((time - start) / DURATION, 0.0), 1.0)
     msg = JointState(name=list(JOINTS))
     msg.header.stamp = stamps.time_msg(time)
-    msg.position = [goal * s**2 * (3 - 2 * s), swing(time - start - DURATION, amplitude)]
+    swings = swing(time - start - DURATION, amplitude, frequency)
+    msg.position = [goal * s**2 * (3 - 2 * s), swings]
     msg.velocity = [goal * 6 * s * (1 - s) / DURATION, 0.0]
     msg.effort = [sin(2 * pi * s), nan]
     return msg
@@ -687,3 +688,29 @@ def test_every_level_has_its_diagnostic_and_unknown_values_are_left_out():
         later = diagnostics.monitor_status(replace(report, level=level), 'done', 3)
         assert later.level == status.level
         assert later.message == f'done; last motion: {report.message}'
+
+
+def test_an_arm_that_ages_is_told_on_its_topic_and_once_in_the_log(graph):
+    bench = Bench(graph)
+    drifts = graph.collect(DiagnosticArray, '/flat_monitor/model_drift', interfaces.LATCHED)
+    count = 22
+    for k in range(count):
+        start = START + 5.0 * k
+        bench.plan(plan_msg(start))
+        softer = FREQUENCY * (1.0 - 1e-3 * k)
+        bench.feed(start + DURATION + WINDOW + 0.1, start, frequency=softer)
+        bench.report(k + 1)
+    graph.expect(lambda: len(drifts) == count - 19, 'drifts from the twentieth motion on')
+    (status,) = drifts[-1].status
+    told = {pair.key: pair.value for pair in status.values}
+    assert status.name == interfaces.DRIFT_NAME
+    assert status.level == DiagnosticStatus.WARN
+    assert status.message.startswith('the arm ages: stiffness_ratio.held ')
+    assert told['drifting'] == 'stiffness_ratio.held'
+    assert told['motions'] == str(count - 1)
+    squared = (2 * pi * FREQUENCY) ** 2 + DECAY**2
+    assert float(told['stiffness_ratio.held']) == pytest.approx(
+        squared * (1.0 - 1e-3 * (count - 1)) ** 2, rel=1e-3
+    )
+    assert float(told['stiffness_ratio.held_rate']) == pytest.approx(-2e-3 * squared, rel=0.03)
+    assert len(graph.logged('the arm ages')) == 1

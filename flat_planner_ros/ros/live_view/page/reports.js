@@ -17,6 +17,7 @@ export class Reports {
     store.on('verdicts', verdicts => this.showVerdicts(verdicts));
     store.on('report', report => this.showReport(report));
     store.on('plan', () => this.showReport());
+    store.on('drift', drift => this.showDrift(drift));
     for (const node of ['flat_planner', 'flat_plant']) store.on(`settings of ${node}`, () => this.showDrive());
   }
 
@@ -29,6 +30,12 @@ export class Reports {
       if (needed) item.disabled = !nodes[needed];
     }
     this.showLevel();
+  }
+
+  // An arm that ages is said beside what its last motion left.
+  showDrift(drift) {
+    $('drift').hidden = !drift || drift.level === 'ok';
+    setText($('drift'), drift ? readable(drift.text) : '');
   }
 
   // What the planner plans for, and whether the plant is driven so.
