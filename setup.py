@@ -137,6 +137,7 @@ setup(
             'record = flat_planner_ros.programs:record',
             'analyse = flat_planner_ros.programs:analyse',
             'identify = flat_planner_ros.programs:identify',
+            'excite = flat_planner_ros.programs:excite',
             'live_view = flat_planner_ros.programs:live_view',
             'demo = flat_planner_ros.programs:demo',
             'make_urdf = flat_planner_ros.programs:make_urdf',

@@ -102,6 +102,11 @@ def identify() -> int:
     return _run_tool('programs.identify')
 
 
+def excite() -> int:
+    """Move an arm until its model is known."""
+    return _run('programs.excite', INTERRUPTED)
+
+
 def paper_table() -> int:
     """Carry out the paper's experiment."""
     return _run('programs.paper_table', INTERRUPTED)

@@ -70,6 +70,7 @@ MESSAGES_ALLOWED = {
     'follow_joint_trajectory.py': 'the same as conversions.py for an action',
     'guarded_callbacks.py': 'answers requests that rclpy cannot read, from rcl_interfaces',
     'stamps.py': 'stamps to seconds and back',
+    'exciter.py': 'sends goals and reads verdicts as any user does',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
 }
 """Patterns of the files that import message packages, each with its reason."""

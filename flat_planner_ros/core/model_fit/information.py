@@ -27,7 +27,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     trajectories,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
-from flat_planner_ros.core.model_fit.observation import observed_of, SEGMENT
+from flat_planner_ros.core.model_fit.observation import noise_of_links, observed_of, SEGMENT
 from flat_planner_ros.core.model_fit.refinement import CHANNELS, first_starts, linearised, Observed
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
 from flat_planner_ros.core.model_fit.signals import segments_of
@@ -151,16 +151,17 @@ def misprediction(arm: PlanarArm, measurements: Measurements) -> FloatArray:
     Returns
     -------
     FloatArray
-        Root mean square of simulated less measured angles over that of the motion, of link n-1
-        and of the passive joint, shape (2,) [-].
+        Root mean square of simulated less measured angles, less that of the noise, over that of
+        the motion, of link n-1 and of the passive joint, shape (2,) [-].
 
     """
     observed = observed_of(measurements, _free_period(arm))
     model, starts, ones = vector_of(arm), first_starts(observed), np.ones(CHANNELS)
     around = linearised(observed, model, starts, (), scales_of(observed, model), ones)
-    left = np.sqrt(np.mean(np.concatenate(around.residuals) ** 2, axis=0))
+    left = np.mean(np.concatenate(around.residuals) ** 2, axis=0)
+    wrong = np.sqrt(np.maximum(left - noise_of_links(measurements) ** 2, 0.0))
     motion = observed.angles.std(axis=0)
-    result: FloatArray = left / np.maximum(motion, np.finfo(float).tiny)
+    result: FloatArray = wrong / np.maximum(motion, np.finfo(float).tiny)
     return result
 
 
