@@ -15,40 +15,31 @@
 """The front door: the whole model from one recording."""
 
 from enum import Enum
-from math import inf
+from math import inf, pi
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
+from flat_planner_ros.core.model_fit.first_fit import FirstFit, fit_first_links
+from flat_planner_ros.core.model_fit.first_links import parameters_of, with_first_links
 from flat_planner_ros.core.model_fit.judgement import doubt
 from flat_planner_ros.core.model_fit.last_fit import fit_last_links, LastFit
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
     COULOMB,
     DAMPING,
+    DELAY,
     LAST,
     NAMES,
     STIFFNESS,
     VISCOUS,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
-from flat_planner_ros.core.model_fit.observation import names_for, noise_of_links
+from flat_planner_ros.core.model_fit.observation import noise_of_links
 from flat_planner_ros.core.model_fit.scales import vector_of
+from flat_planner_ros.core.model_fit.table import entries
 import numpy as np
-
-UNITS = ('kg m^2', 'kg m^2', 'N m/rad', 'N m s/rad', 'N m s/rad', 'N m', 'rad', 's')
-"""Units of `last_links.NAMES`."""
-
-TELLING = (
-    'a motion with effort at joint n-1',
-    'a motion in which effort at joint n-1 swings the passive joint',
-    'a motion that swings the passive joint',
-    'a motion after which the passive joint swings on for several periods',
-    'motions of joint n-1 at different speeds',
-    'slow motions of joint n-1 that turn back',
-    'a rest, or a swing of many periods',
-    'a motion with quick changes of effort',
-)
-"""What would tell a parameter, in the order of `last_links.NAMES`."""
+import numpy.typing as npt
 
 
 class Trust(Enum):
@@ -102,79 +93,115 @@ def fit_model(
     if measurements.joints != start.n:
         raise InvalidRequest(f'{measurements.joints} joints measured, the arm has {start.n}')
     last = fit_last_links(measurements, start, with_imbalance=with_imbalance)
-    return _result(measurements, start, last, trust)
+    first = None
+    if start.n > 2:
+        period = 2 * pi / start.natural_mode().frequency
+        found = last.found.parameters
+        friction = float(found[VISCOUS]), float(found[COULOMB])
+        first = fit_first_links(measurements, start, period, friction, float(found[DELAY]))
+    return _result(measurements, start, _whole(start, last, first, trust), last, first)
+
+
+class _Whole(NamedTuple):
+    """All parameters in the order of `table.entries`: believed, found, told, and their errors."""
+
+    believed: FloatArray
+    values: FloatArray
+    is_told: npt.NDArray[np.bool_]
+    errors: FloatArray
+    effort_scale: float
+
+
+def _whole(start: PlanarArm, last: LastFit, first: FirstFit | None, trust: Trust) -> _Whole:
+    """Return last and first links together, with the scale that is trusted."""
+    firsts = 0 if first is None else first.values.size
+    count = len(NAMES) + firsts + 1
+    believed = np.concatenate((vector_of(start), parameters_of(start), [0.0]))
+    values, errors = believed.copy(), np.zeros((count, count))
+    told = np.zeros(count, dtype=bool)
+    values[: len(NAMES)] = last.found.parameters[: len(NAMES)]
+    errors[: len(NAMES), : len(NAMES)] = last.errors
+    told[last.free] = True
+    if first is not None:
+        place = slice(len(NAMES), len(NAMES) + firsts)
+        values[place], errors[place, place] = first.values, first.errors
+        told[len(NAMES) + np.array(first.free, dtype=int)] = True
+    scale = 1.0
+    if trust is Trust.INERTIA and told[BOTH]:
+        scale = float(believed[BOTH] / values[BOTH])
+        table = entries(start.n, has_gravity=start.has_weight)
+        of_effort = told & np.array([entry.is_of_effort for entry in table])
+        values, errors = _scaled_to_inertia(values, errors, float(believed[BOTH]), of_effort)
+    return _Whole(believed, values, told, errors, scale)
 
 
 def _scaled_to_inertia(
-    values: FloatArray, errors: FloatArray, trusted: float
+    values: FloatArray, errors: FloatArray, trusted: float, of_effort: npt.NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
     """Return parameters and covariance in proportion to an inertia I*_{n-1} that is trusted."""
-    with_effort = np.arange(len(NAMES)) <= COULOMB
     # Errors of the ratio to that inertia, which has none itself.
-    ratio = np.eye(len(NAMES))
-    ratio[:, BOTH] -= with_effort * values / values[BOTH]
-    factor = np.where(with_effort, trusted / values[BOTH], 1.0)
+    ratio = np.eye(values.size)
+    ratio[:, BOTH] -= of_effort * values / values[BOTH]
+    factor = np.where(of_effort, trusted / values[BOTH], 1.0)
     return values * factor, ratio @ errors @ ratio.T * np.outer(factor, factor)
 
 
 def _result(
     measurements: Measurements,
     start: PlanarArm,
+    whole: _Whole,
     last: LastFit,
-    trust: Trust,
+    first: FirstFit | None,
 ) -> ModelFit:
     """Put numbers into words."""
-    observed, found, free, errors, imbalance = last
-    believed, values = vector_of(start), found.parameters[: len(NAMES)]
-    scale = 1.0
-    if trust is Trust.INERTIA and BOTH in free:
-        scale = float(believed[BOTH] / values[BOTH])
-        values, errors = _scaled_to_inertia(values, errors, float(believed[BOTH]))
+    observed, around = last.observed, last.found.around
     residuals = np.full(observed.angles.shape, np.nan)
-    for segment, part in zip(observed.segments, found.around.residuals, strict=True):
+    for segment, part in zip(observed.segments, around.residuals, strict=True):
         residuals[segment.first : segment.last] = part
     noise = noise_of_links(measurements)
+    explained = np.hypot(noise, last.by_base)
+    doubts = [doubt(around, last.found.spread, explained, observed.angles.std(axis=0))]
+    if first is not None:
+        doubts.append(first.misfit)
     return ModelFit(
-        arm=_arm(start, values),
-        estimates=_estimates(start, values, errors, free),
-        effort_scale=scale,
+        arm=_arm(start, whole.values),
+        estimates=_estimates(start, whole),
+        effort_scale=whole.effort_scale,
         times=measurements.times,
         residuals=residuals,
-        residual_rms=found.spread,
+        residual_rms=last.found.spread,
         noise=noise,
-        misfit=doubt(found.around, found.spread, noise, observed.angles.std(axis=0)),
-        imbalance=imbalance,
-        covariance=errors,
+        misfit='; '.join(filter(None, doubts)),
+        covariance=whole.errors,
+        imbalance=last.imbalance,
     )
 
 
-def _estimates(
-    start: PlanarArm, values: FloatArray, errors: FloatArray, free: list[int]
-) -> tuple[ParameterEstimate, ...]:
-    """Return the estimates of the last two links."""
-    believed, stds = vector_of(start), np.sqrt(np.diag(errors))
-    names = names_for(start.n)
+def _estimates(start: PlanarArm, whole: _Whole) -> tuple[ParameterEstimate, ...]:
+    """Return all parameters with what would tell those that are not told."""
+    stds = np.sqrt(np.diag(whole.errors))
     return tuple(
         ParameterEstimate(
-            name=name,
-            unit=UNITS[index],
-            start=float(believed[index]),
-            value=float(values[index]),
-            std=float(stds[index]) if index in free else inf,
-            is_told=index in free,
-            remark='' if index in free else f'{TELLING[index]} would tell it',
+            name=entry.name,
+            unit=entry.unit,
+            start=float(whole.believed[index]),
+            value=float(whole.values[index]),
+            std=float(stds[index]) if whole.is_told[index] else inf,
+            is_told=bool(whole.is_told[index]),
+            remark='' if whole.is_told[index] else f'{entry.telling} would tell it',
         )
-        for index, name in enumerate(names)
+        for index, entry in enumerate(entries(start.n, has_gravity=start.gravity != 0.0))
     )
 
 
 def _arm(start: PlanarArm, values: FloatArray) -> PlanarArm:
-    """Return the arm with the values of the last two links; none of them is negative."""
+    """Return the arm with the values found; none of friction and damping is negative."""
     damping, viscous, coulomb = np.maximum(values[[DAMPING, VISCOUS, COULOMB]], 0.0).tolist()
-    return start.with_last_links(
+    arm = start.with_last_links(
         inertia_star=(float(values[BOTH]), float(values[LAST])),
         stiffness=float(values[STIFFNESS]),
         damping=damping,
         viscous=viscous,
         coulomb=coulomb,
     )
+    return arm if start.n == 2 else with_first_links(arm, values[len(NAMES) : -1])

@@ -14,6 +14,7 @@
 
 """The fit of the last two links: a guess, its refinement, what is told, and how well."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import pi
 from typing import NamedTuple
@@ -33,7 +34,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     VISCOUS,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
-from flat_planner_ros.core.model_fit.observation import noise_of_links, observed_of
+from flat_planner_ros.core.model_fit.observation import base_rate, noise_of_links, observed_of
 from flat_planner_ros.core.model_fit.refinement import (
     first_starts,
     linearised,
@@ -61,6 +62,9 @@ CLEAR = 9.0
 UNDECIDED, DECIDED = 0.5, 0.1
 """Share of the interpolations' difference that stays as a systematic error [-]."""
 
+SHORTER, LONGER = 0.6, 1.6
+"""Factors on the span of smoothed velocities, what comes of which shows what they cost [-]."""
+
 GIVEN_UP_FIRST = (DELAY, COULOMB, VISCOUS, OFFSET, LAST, BOTH, DAMPING, STIFFNESS)
 """Of parameters that only together are told, the one that is kept at its start value."""
 
@@ -81,6 +85,8 @@ class LastFit(NamedTuple):
         Covariance of all, zero for those that are not told, shape (8, 8).
     imbalance
         Of the last link; None where it was not looked for, or nothing tells it.
+    by_base
+        What the noise of the velocity of link n-2 does to either angle, shape (2,) [rad].
 
     """
 
@@ -89,6 +95,7 @@ class LastFit(NamedTuple):
     free: list[int]
     errors: FloatArray
     imbalance: ImbalanceEstimate | None
+    by_base: FloatArray
 
 
 def fit_last_links(
@@ -107,7 +114,16 @@ def fit_last_links(
         former = observed
         imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
         other = (other[0] if observed is former else former, other[1])
-    return LastFit(observed, found, free, _errors(observed, other, found, free, scales), imbalance)
+    doubtful = [(other[1], other[0])]
+    # The integration is of second order: twice the step adds three times the error.
+    doubtful.append((1 / 3, replace(observed, refinement=observed.refinement / 2)))
+    if observed.base.any():
+        for factor in (SHORTER, LONGER):
+            base = base_rate(measurements, period, factor)
+            doubtful.append((1.0, replace(observed, base=base)))
+    errors, changes = _errors(doubtful, found, free, scales)
+    by_base = np.linalg.norm([np.zeros(2), *changes[2:]], axis=0)
+    return LastFit(observed, found, free, errors, imbalance, by_base)
 
 
 def _guesses(
@@ -186,24 +202,27 @@ def _told(
 
 
 def _errors(
-    observed: Observed,
-    other: tuple[Observed, float],
+    doubtful: Sequence[tuple[float, Observed]],
     found: Refined,
     free: list[int],
     scales: FloatArray,
-) -> FloatArray:
-    """Return the covariance (8, 8) of the parameters: noise, interpolation and integration."""
+) -> tuple[FloatArray, list[FloatArray]]:
+    """
+    Return the covariance (8, 8) of the parameters, of noise and of what is doubtful.
+
+    For each doubtful way to see the recording, with the share of its difference that counts, also
+    by how much the residuals differ, shape (2,) [rad].
+    """
     size = np.outer(scales[free], scales[free])
     inside = covariance(found.around, scales[free]) * size
-    alternative, share = other
-    # The integration is of second order: twice the step adds three times the error.
-    halved = replace(observed, refinement=observed.refinement / 2)
-    for weight, changed in ((share, alternative), (1 / 3, halved)):
+    here, changes = np.concatenate(found.around.residuals), []
+    for weight, changed in doubtful:
         there = linearised(changed, found.parameters, found.starts, free, scales, found.spread)
         normal = there.normal.sum(axis=0) * size + np.eye(len(free)) * 1e-12
         change = there.gradient - found.around.gradient
         moved = weight * scales[free] * np.linalg.solve(normal, scales[free] * change)
         inside += np.outer(moved, moved)
+        changes.append(np.sqrt(np.mean((np.concatenate(there.residuals) - here) ** 2, axis=0)))
     whole = np.zeros((len(NAMES), len(NAMES)))
     whole[np.ix_(free, free)] = inside
-    return whole
+    return whole, changes

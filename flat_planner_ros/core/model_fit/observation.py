@@ -18,11 +18,6 @@ from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
 from flat_planner_ros.core.model_fit.imbalance import turning_of
-from flat_planner_ros.core.model_fit.last_links import (
-    COULOMB,
-    NAMES,
-    VISCOUS,
-)
 from flat_planner_ros.core.model_fit.measurements import (
     encoder_step,
     Measurements,
@@ -30,7 +25,13 @@ from flat_planner_ros.core.model_fit.measurements import (
     noise_of,
 )
 from flat_planner_ros.core.model_fit.refinement import Observed
-from flat_planner_ros.core.model_fit.signals import derivatives, segments_of
+from flat_planner_ros.core.model_fit.signals import (
+    derivatives,
+    FEWEST,
+    rate_noise,
+    segments_of,
+    span_for,
+)
 import numpy as np
 
 SEGMENT = 6.0
@@ -40,12 +41,16 @@ SMOOTHING = 0.15
 """Span of the polynomials that smooth velocities, in free periods [-]."""
 
 
+QUIET = 4.0
+"""Velocity of link n-2 relative to its noise below which it counts as rest [-]."""
+
+
 def observed_of(measurements: Measurements, period: float) -> Observed:
     """Return the last two links in absolute angles."""
     times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
-    span = max(SMOOTHING * period, 6 * measurements.period)
+    span = max(SMOOTHING * period, FEWEST * measurements.period)
     _, rates, accelerations = derivatives(times, angles, span)
-    base = rates[:, -3] if measurements.joints > 2 else np.zeros(times.size)
+    base = base_rate(measurements, period)
     segments = segments_of(times, measurements.period, SEGMENT * period)
     if not segments:
         raise InvalidRequest('the measurements have no stretch without gaps')
@@ -65,15 +70,42 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
     )
 
 
+def base_rate(measurements: Measurements, period: float, longer: float = 1.0) -> FloatArray:
+    """
+    Return the smoothed velocity of link n-2, shape (m,); nothing moves there with two joints.
+
+    Parameters
+    ----------
+    measurements
+        What was measured.
+    period
+        Of the free passive joint [s].
+    longer
+        Factor on the span of the polynomials [-].
+
+    """
+    if measurements.joints == 2:
+        return np.zeros(measurements.times.size)
+    noise = float(np.linalg.norm(noise_of(measurements)[:-2]))
+    span = longer * span_for(noise, measurements.period, SMOOTHING * period)
+    angle = measurements.positions[:, :-2].sum(axis=1, keepdims=True)
+    rate = derivatives(measurements.times, angle, span)[1][:, 0]
+    left = rate_noise(noise, measurements.period, span)
+    # Noise of a link at rest would drag joint n-1 along by Coulomb friction.
+    return _still_at_rest(rate, QUIET * left, round(span / measurements.period))
+
+
+def _still_at_rest(rate: FloatArray, bound: float, samples: int) -> FloatArray:
+    """Return a velocity that is zero where it is within a bound for some samples in a row."""
+    loud = (np.abs(rate) > bound).astype(float)
+    near = np.ones(2 * samples + 1)
+    alone = np.convolve(np.pad(loud, samples, mode='edge'), near, mode='valid') == 0.0
+    padded = np.pad(alone.astype(float), samples)
+    result: FloatArray = np.where(np.convolve(padded, near, mode='valid') > 0.0, 0.0, rate)
+    return result
+
+
 def noise_of_links(measurements: Measurements) -> FloatArray:
     """Return the noise of link n-1 and of the passive joint, shape (2,) [rad]."""
     each = noise_of(measurements)
     return np.array([np.linalg.norm(each[:-1]), each[-1]])
-
-
-def names_for(joints: int) -> list[str]:
-    """Return the names of the last links' parameters, with the joint where it is friction's."""
-    names = list(NAMES)
-    for index in (VISCOUS, COULOMB):
-        names[index] += f'[{joints - 1}]'
-    return names

@@ -217,7 +217,7 @@ def linearised(
             share = observed.rounding[channel] / spread[channel]
             rounding += share**2 * _alike(own, moves)
         scores = (left[:, None] * left_columns).reshape(len(misfit), CHANNELS, count).sum(axis=1)
-        scatter += _neighbours(scores)
+        scatter += neighbours(scores, max(1, round(NEIGHBOURS * len(scores))))
         residuals.append(left.reshape(-1, CHANNELS) * spread)
         solved = np.linalg.solve(triangle, np.column_stack((inside, inside_columns)))
         corrections.append((-solved[:, 0], -solved[:, 1:]))
@@ -232,9 +232,8 @@ def _alike(columns: FloatArray, moves: npt.NDArray[np.bool_]) -> FloatArray:
     return product
 
 
-def _neighbours(scores: FloatArray) -> FloatArray:
-    """Return the sum of products of rows, the weight falling to zero with their distance."""
-    window = max(1, round(NEIGHBOURS * len(scores)))
+def neighbours(scores: FloatArray, window: int) -> FloatArray:
+    """Return the sum of products of rows, the weight falling to zero within a window of them."""
     padded = np.zeros((len(scores) + window, scores.shape[1]))
     padded[: len(scores)] = scores
     total = np.cumsum(padded, axis=0)

@@ -15,6 +15,7 @@
 """Signals between their samples, smoothed derivatives, and pieces of a recording."""
 
 from itertools import pairwise
+from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
@@ -22,6 +23,15 @@ import numpy as np
 
 GAP = 5.0
 """Time between two samples that ends a segment, relative to the usual one [-]."""
+
+RATE_GAIN = 8.7
+"""Noise of a velocity by polynomials of degree 4, for unit noise, sample and span [-]."""
+
+RATE_NOISE = 3e-3
+"""Noise of velocities that is aimed at, well below that of Coulomb friction [rad/s]."""
+
+FEWEST = 6
+"""Fewest samples that polynomials span."""
 
 SHORTEST = 12
 """Fewest samples of a segment: its start alone takes four unknowns [-]."""
@@ -102,6 +112,31 @@ def hermite(
     back = rise - step * last_slope
     result: FloatArray = first + share * (rise + (1 - share) * ((1 - share) * bend + share * back))
     return result
+
+
+def span_for(noise: float, period: float, longest: float) -> float:
+    """
+    Return the time that smoothing polynomials span: as short as the noise admits.
+
+    Where friction turns, a velocity has a kink, which polynomials round off.
+
+    Parameters
+    ----------
+    noise
+        Of the angles [rad].
+    period
+        Time between two samples [s].
+    longest
+        Bound on the span, unless that is less than a polynomial needs [s].
+
+    """
+    wanted: float = (RATE_GAIN * noise * sqrt(period) / RATE_NOISE) ** (2 / 3)
+    return max(min(wanted, longest), FEWEST * period)
+
+
+def rate_noise(noise: float, period: float, span: float) -> float:
+    """Return the noise of velocities by polynomials that span a time [rad/s], as `span_for`."""
+    return float(RATE_GAIN * noise * sqrt(period) / span**1.5)
 
 
 def derivatives(

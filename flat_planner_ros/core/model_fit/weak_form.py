@@ -73,24 +73,45 @@ class LinkSignals(NamedTuple):
     effort: FloatArray
 
 
-class _Windows:
-    """Integrals of signals over windows, or over their derivatives."""
+class Windows:
+    """
+    Weighted means of signals over windows, and of their derivatives without differentiating.
 
-    def __init__(self, times: FloatArray, length: float) -> None:
-        """Sample a window and its derivatives."""
+    Parameters
+    ----------
+    times
+        Of the signals, evenly spaced, shape (m,) [s].
+    length
+        Of a window [s].
+    power
+        A window is (1 - x^2)^power.
+
+    """
+
+    def __init__(self, times: FloatArray, length: float, power: int = POWER) -> None:
         period = float(times[1] - times[0])
-        half = max(4, round(length / period / 2))
-        polynomial = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** POWER
+        half = max(power, round(length / period / 2))
+        polynomial = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** power
         x = np.arange(-half, half + 1) / half
         scale = half * period
+        total = float(polynomial(x).sum())
         derivatives = polynomial, polynomial.deriv(1), polynomial.deriv(2)
-        self._windows = [values(x) / scale**k for k, values in enumerate(derivatives)]
+        self._windows = [values(x) / scale**k / total for k, values in enumerate(derivatives)]
         self._stride = max(1, 2 * half // OVERLAP)
 
+    @property
+    def samples(self) -> int:
+        """Return the number of samples of a window."""
+        return self._windows[0].size
+
     def __call__(self, signal: FloatArray, order: int = 0) -> FloatArray:
-        """Return the integrals of a signal's derivative of some order."""
+        """Return the means of a signal's derivative of some order, 0 to 2; shape (windows,)."""
         weights = (-1) ** order * self._windows[order]
         return np.correlate(signal, weights, mode='valid')[:: self._stride]
+
+    def gain(self, order: int) -> float:
+        """Return the spread of such a mean for white noise of a standard deviation of one."""
+        return float(np.linalg.norm(self._windows[order]))
 
 
 def weak_guess(signals: LinkSignals, period: float) -> FloatArray:
@@ -105,7 +126,7 @@ def weak_guess(signals: LinkSignals, period: float) -> FloatArray:
         Rough period of the free passive joint [s].
 
     """
-    windows = _Windows(signals.times, WINDOW * period)
+    windows = Windows(signals.times, WINDOW * period)
     sample = float(signals.times[1] - signals.times[0])
     shifts = range(round(LARGEST_DELAY / sample) + 1)
     shift = min(shifts, key=lambda count: _momentum(signals, windows, count)[1])
@@ -144,7 +165,7 @@ def seen_stiffness(
 
     """
     even = np.linspace(times[0], times[-1], len(times))
-    windows = _Windows(even, WINDOW * period)
+    windows = Windows(even, WINDOW * period)
     if len(windows(even)) <= 2:
         return 1.0, inf
     columns = np.column_stack([windows(np.interp(even, times, passive), k) for k in (0, 1)])
@@ -155,7 +176,7 @@ def seen_stiffness(
     return float(stiffness / arm.stiffness), float(np.sqrt(spread) / arm.stiffness)
 
 
-def _momentum(signals: LinkSignals, windows: _Windows, shift: int) -> tuple[FloatArray, float]:
+def _momentum(signals: LinkSignals, windows: Windows, shift: int) -> tuple[FloatArray, float]:
     """Fit the sum of both rows, free of the spring: effort changes the momentum of both links."""
     effort = np.concatenate((np.full(shift, signals.effort[0]), signals.effort))
     columns = np.column_stack(
@@ -169,7 +190,7 @@ def _momentum(signals: LinkSignals, windows: _Windows, shift: int) -> tuple[Floa
     return _least_squares(columns, windows(effort[: signals.effort.size]))
 
 
-def _spring(signals: LinkSignals, windows: _Windows, last: float) -> tuple[float, float, float]:
+def _spring(signals: LinkSignals, windows: Windows, last: float) -> tuple[float, float, float]:
     """Fit the row of the last link: stiffness, damping, and stiffness times offset."""
     columns = np.column_stack(
         [

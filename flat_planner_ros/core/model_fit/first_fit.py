@@ -1,0 +1,330 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The fit of the first n-2 links: weighted least squares of their rows, and what they tell."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray, PlanarArm
+from flat_planner_ros.core.model_fit.first_links import (
+    Chain,
+    ChainSignals,
+    COULOMB,
+    KINDS,
+    MOMENT,
+    OFFSET,
+    OWN,
+    parameters_of,
+    rows,
+    VISCOUS,
+)
+from flat_planner_ros.core.model_fit.judgement import correlation_length
+from flat_planner_ros.core.model_fit.last_fit import LONGER
+from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
+from flat_planner_ros.core.model_fit.refinement import neighbours
+from flat_planner_ros.core.model_fit.scales import FRICTION_SHARE, OFFSET_SCALE
+from flat_planner_ros.core.model_fit.signals import derivatives, span_for, stretches
+from flat_planner_ros.core.model_fit.weak_form import OVERLAP, Windows
+import numpy as np
+
+WINDOW, SHORTEST = 0.5, 26
+"""Length of a window, in free periods of the passive joint [-] and at least in samples."""
+
+POWER = 6
+"""A window is (1 - x^2)^POWER, so smooth at its ends that sums are as good as integrals."""
+
+SMOOTHING = 0.15
+"""Longest span of the polynomials that smooth velocities, in free periods [-]."""
+
+RESTING = 3.0
+"""Velocity below which friction may be anything, in those of Coulomb friction [-]."""
+
+MOSTLY = 0.3
+"""Share of a window at rest from which it tells nothing of that joint [-]."""
+
+MOMENT_SHARE = 0.3
+"""Scale of a static moment, relative to sqrt(carried mass * inertia) [-]."""
+
+TOLD = 0.3
+"""Largest standard error of a parameter that counts as told, relative to its scale [-]."""
+
+CERTAIN = 3.0
+"""Standard errors from its start value from which a parameter counts as told all the same [-]."""
+
+SIMILAR = 0.01
+"""Errors relative to the largest that count as of its size [-]."""
+
+STEPS = 12
+"""Most steps of Gauss and Newton: all but the offsets is linear."""
+
+CONVERGED = 1e-8
+"""Step that is the last, relative to the scales [-]."""
+
+LEAST_ALIKE = 2.0
+"""Windows that at least count as one, since their neighbours share most samples [-]."""
+
+FAR = 100.0
+"""Error of what nothing tells, relative to the scales [-]."""
+
+LARGE = 4.0
+"""Offset that is hardly believed, relative to its scale [-]."""
+
+NULL, TINY = 1e-9, 1e-30
+"""Ridge of the normal equations, relative to their diagonal and at least [-]."""
+
+GIVEN_UP_FIRST = (OFFSET, COULOMB, VISCOUS, MOMENT, OWN)
+"""Of parameters that only together are told, the kind that is kept at its start value."""
+
+EXCESS, FLOOR = 1.5, 0.01
+"""Effort left over relative to what noise explains, and to the effort, that is in doubt [-]."""
+
+
+class FirstFit(NamedTuple):
+    """
+    The first links as fitted.
+
+    Attributes
+    ----------
+    values
+        Parameters in the order of `first_links.KINDS`, shape (5 m,).
+    free
+        Which of them the motion tells.
+    errors
+        Covariance of all, zero for those that are not told, shape (5 m, 5 m).
+    misfit
+        What the model does not explain; empty if noise explains what is left.
+
+    """
+
+    values: FloatArray
+    free: list[int]
+    errors: FloatArray
+    misfit: str
+
+
+class _Rows(NamedTuple):
+    """Rows of all windows: slopes (w, m, P), what is left (w, m) and weights (w, m)."""
+
+    slopes: FloatArray
+    left: FloatArray
+    weights: FloatArray
+
+
+def fit_first_links(
+    measurements: Measurements,
+    start: PlanarArm,
+    period: float,
+    last_friction: tuple[float, float],
+    delay: float,
+) -> FirstFit:
+    """
+    Fit the first links of an arm of three or more joints.
+
+    Parameters
+    ----------
+    measurements, start
+        As for `fit_model`.
+    period
+        Free period of the passive joint [s].
+    last_friction
+        Viscous and Coulomb friction of joint n-1 [N m s/rad], [N m].
+    delay
+        By which efforts act later than they are stamped [s].
+
+    """
+    chain = Chain.of(start, last_friction)
+    parts = _signals(measurements, period, delay)
+    believed = parameters_of(start)
+    scales = _scales(parts, start, believed)
+    free = list(range(believed.size))
+    linear = [i for i in free if i // (start.n - 2) != OFFSET]
+    values, _ = _solved(parts, chain, believed, linear, scales)
+    scales = np.maximum(scales, np.abs(values))
+    while True:
+        values, found = _solved(parts, chain, values, free, scales)
+        errors = _covariance(found, free, scales)
+        ratio = np.sqrt(np.diag(errors))
+        away = np.abs(values - believed)[free] / scales[free]
+        is_vague = (ratio > TOLD) & (away < CERTAIN * ratio)
+        if not is_vague.any():
+            break
+        # Parameters that only together are told have errors of one size.
+        most = ratio[is_vague].max()
+        vague = [free[i] for i in np.flatnonzero(is_vague & (ratio > SIMILAR * most))]
+        given_up = min(vague, key=lambda i: GIVEN_UP_FIRST.index(i // (start.n - 2)))
+        free.remove(given_up)
+        values[given_up] = believed[given_up]
+    smoother = _signals(measurements, period, delay, LONGER)
+    other, _ = _solved(smoother, chain, values, free, scales)
+    whole = np.outer(other - values, other - values)
+    whole[np.ix_(free, free)] += errors * np.outer(scales[free], scales[free])
+    misfit = _doubt(found, values, chain, noise_of(measurements), parts)
+    return FirstFit(values, free, whole, misfit)
+
+
+def _signals(
+    measurements: Measurements, period: float, delay: float, longer: float = 1.0
+) -> list[tuple[ChainSignals, Windows]]:
+    """Return each stretch without gaps on an even grid, with its windows."""
+    found = []
+    sample = measurements.period
+    noise = float(np.linalg.norm(noise_of(measurements)[:-1]))
+    span = longer * span_for(noise, sample, SMOOTHING * period)
+    for first, last in stretches(measurements.times, sample):
+        times = measurements.times[first:last]
+        count = round(float(times[-1] - times[0]) / sample) + 1
+        length = max(WINDOW * period, SHORTEST * sample)
+        if count <= length / sample + 2:
+            continue
+        grid = np.linspace(times[0], times[-1], count)
+        windows = Windows(grid, length, POWER)
+        absolute = np.cumsum(measurements.positions[first:last], axis=1)[:, :-1]
+        angles = np.column_stack([np.interp(grid, times, column) for column in absolute.T])
+        rates = derivatives(grid, angles, span)[1]
+        joints = np.diff(rates, axis=1, prepend=0.0)
+        efforts = measurements.efforts[first:last].T
+        signals = ChainSignals(
+            times=grid,
+            angles=angles[:, :-1],
+            rates=rates[:, :-1],
+            last_rate=joints[:, -1],
+            efforts=np.column_stack([np.interp(grid - delay, times, each) for each in efforts]),
+            resting=(np.abs(joints) < RESTING * COULOMB_VELOCITY).astype(float),
+        )
+        found.append((signals, windows))
+    return found
+
+
+def _scales(
+    parts: list[tuple[ChainSignals, Windows]], start: PlanarArm, believed: FloatArray
+) -> FloatArray:
+    """Return how far each parameter may reasonably be off, shape (5 m,)."""
+    count = start.n - 2
+    scales = np.abs(believed).reshape(len(KINDS), count)
+    effort = np.full(count, 1e-12)
+    rate = np.full(count, 1e-9)
+    for signals, _ in parts:
+        joints = np.diff(signals.rates, axis=1, prepend=0.0)
+        effort = np.maximum(effort, signals.efforts[:, :-1].std(axis=0))
+        rate = np.maximum(rate, joints.std(axis=0))
+    least = MOMENT_SHARE * np.sqrt(start.carried_mass[:count] * scales[OWN])
+    scales[MOMENT] = np.maximum(scales[MOMENT], least)
+    scales[VISCOUS] = np.maximum(scales[VISCOUS], FRICTION_SHARE * effort / rate)
+    scales[COULOMB] = np.maximum(scales[COULOMB], FRICTION_SHARE * effort)
+    scales[OFFSET] = OFFSET_SCALE
+    return scales.ravel()
+
+
+def _rows_around(
+    parts: list[tuple[ChainSignals, Windows]], chain: Chain, values: FloatArray
+) -> _Rows:
+    """Return the rows of all stretches; those in which a joint of theirs rests have no weight."""
+    count = values.size // len(KINDS)
+    slopes, left, weights = [np.empty((0, count, values.size))], [np.empty((0, count))], []
+    weights.append(left[0])
+    for signals, windows in parts:
+        by, rest = rows(signals, windows, chain, values)
+        still = np.column_stack([windows(column) for column in signals.resting.T])
+        slopes.append(by)
+        left.append(rest)
+        weights.append((np.maximum(still[:, :-1], still[:, 1:]) < MOSTLY).astype(float))
+    whole = _Rows(np.concatenate(slopes), np.concatenate(left), np.concatenate(weights))
+    spread = np.sqrt(np.average(whole.left**2, axis=0, weights=whole.weights + 1e-12))
+    return whole._replace(weights=whole.weights / np.maximum(spread, 1e-300) ** 2)
+
+
+def _solved(
+    parts: list[tuple[ChainSignals, Windows]],
+    chain: Chain,
+    values: FloatArray,
+    free: list[int],
+    scales: FloatArray,
+) -> tuple[FloatArray, _Rows]:
+    """Return the free parameters with the least weighted sum of squares, and the rows there."""
+    around = _rows_around(parts, chain, values)
+    for _ in range(STEPS):
+        if not free or not len(around.left):
+            break
+        slopes = around.slopes[:, :, free] * scales[free]
+        normal = np.einsum('wmp,wm,wmq->pq', slopes, around.weights, slopes)
+        gradient = np.einsum('wmp,wm->p', slopes, around.weights * around.left)
+        # Offsets are small by belief: far from zero their rows are no longer linear.
+        is_offset = np.array(free) // around.left.shape[1] == OFFSET
+        gradient -= is_offset / LARGE**2 * values[free] / scales[free]
+        normal += np.diag(NULL * (np.diag(normal) + TINY) + is_offset / LARGE**2)
+        step = np.linalg.solve(normal, gradient)
+        values = values.copy()
+        values[free] += scales[free] * step
+        around = _rows_around(parts, chain, values)
+        if np.abs(step).max() < CONVERGED:
+            break
+    return values, around
+
+
+def _covariance(around: _Rows, free: list[int], scales: FloatArray) -> FloatArray:
+    """
+    Return the covariance of the free parameters, in units of their scales.
+
+    A sandwich whose scores are correlated as far as windows overlap (Newey and West 1987), or, if
+    that is larger, the normal equations with windows that err alike counting as one.
+    """
+    slopes = around.slopes[:, :, free] * scales[free]
+    normal = np.einsum('wmp,wm,wmq->pq', slopes, around.weights, slopes)
+    inverse = np.linalg.inv(normal + np.eye(len(free)) / FAR**2)
+    scores = np.einsum('wmp,wm->wp', slopes, around.weights * around.left)
+    by_scores = inverse @ neighbours(scores, 2 * OVERLAP) @ inverse if len(scores) else inverse
+    alike = _alike(around)
+    by_length = inverse * alike
+    larger = np.sqrt(np.maximum(np.diag(by_scores) / np.diag(by_length), 1.0))
+    independent = max(np.count_nonzero(around.weights) / alike, 1.0)
+    few = independent / max(independent - len(free), 1.0)
+    result: FloatArray = by_length * np.outer(larger, larger) * few
+    return result
+
+
+def _alike(around: _Rows) -> float:
+    """Return how many windows are worth one, at most those that overlap [-]."""
+    used = [
+        left[weight > 0.0] for left, weight in zip(around.left.T, around.weights.T, strict=True)
+    ]
+    lengths = [correlation_length([each]) for each in used if each.size > OVERLAP]
+    return float(np.clip(max(lengths, default=OVERLAP), LEAST_ALIKE, OVERLAP))
+
+
+def _doubt(
+    around: _Rows,
+    values: FloatArray,
+    chain: Chain,
+    noise: FloatArray,
+    parts: list[tuple[ChainSignals, Windows]],
+) -> str:
+    """Return what the rows leave unexplained, empty if noise explains it."""
+    count = values.size // len(KINDS)
+    own, moment = values.reshape(len(KINDS), count)[[OWN, MOMENT]]
+    inertia = np.diag(own) + np.triu(np.outer(chain.lengths, moment), k=1)
+    inertia += np.triu(inertia, k=1).T
+    spread = np.sqrt(np.cumsum(noise[:count] ** 2))
+    found = []
+    for i in range(count):
+        is_used = around.weights[:, i] > 0.0
+        if not is_used.any():
+            continue
+        left = sqrt(np.mean(around.left[is_used, i] ** 2))
+        effort = max(float(signals.efforts[:, i].std()) for signals, _ in parts)
+        by_noise = float(np.linalg.norm(inertia[i] * spread)) * parts[0][1].gain(2)
+        allowed = float(np.hypot(by_noise, FLOOR * effort))
+        if left > EXCESS * allowed:
+            found.append(f'{left:.2g} N m at link {i + 1} where {allowed:.2g} N m are allowed')
+    return '; '.join(found)
