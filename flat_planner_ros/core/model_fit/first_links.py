@@ -100,7 +100,7 @@ def parameters_of(arm: PlanarArm) -> FloatArray:
     )
 
 
-def with_first_links(arm: PlanarArm, parameters: FloatArray) -> PlanarArm:
+def with_first_links(arm: PlanarArm, values: FloatArray) -> PlanarArm:
     """
     Return a copy with other first links; its lengths stay, masses grow where they must.
 
@@ -108,12 +108,12 @@ def with_first_links(arm: PlanarArm, parameters: FloatArray) -> PlanarArm:
     ----------
     arm
         Of three or more joints.
-    parameters
+    values
         In the order of KINDS, shape (5 m,); friction below zero counts as none.
 
     """
     count = arm.n - 2
-    own, moment, viscous, coulomb, _ = parameters.reshape(len(KINDS), count)
+    own, moment, viscous, coulomb, _ = values.reshape(len(KINDS), count)
     lengths = Chain.of(arm, (0.0, 0.0)).lengths
     coupling = np.triu(np.outer(lengths, moment), k=1)
     inertia, static_moment = arm.inertia.copy(), arm.static_moment.copy()
@@ -134,7 +134,7 @@ def with_first_links(arm: PlanarArm, parameters: FloatArray) -> PlanarArm:
 
 
 def rows(
-    signals: ChainSignals, windows: Windows, chain: Chain, parameters: FloatArray
+    signals: ChainSignals, windows: Windows, chain: Chain, values: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
     Return the rows of all first links around a set of parameters.
@@ -147,7 +147,7 @@ def rows(
         To integrate over.
     chain
         What is taken for true.
-    parameters
+    values
         Shape (5 m,).
 
     Returns
@@ -158,7 +158,7 @@ def rows(
 
     """
     count = signals.angles.shape[1]
-    own, moment, viscous, coulomb, offset = parameters.reshape(len(KINDS), count)
+    own, moment, viscous, coulomb, offset = values.reshape(len(KINDS), count)
     angles = signals.angles - np.cumsum(offset)
     columns = np.zeros((len(windows(signals.times)), count, len(KINDS), count))
     for i in range(count):
