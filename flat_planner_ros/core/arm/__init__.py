@@ -45,7 +45,12 @@ from flat_planner_ros.core.arm.errors import (
 from flat_planner_ros.core.arm.flat_map import apply_row, flat_map, FlatMap, FlatModel
 from flat_planner_ros.core.arm.imbalance import balanced, imbalance
 from flat_planner_ros.core.arm.joint_merger import JointMerger
-from flat_planner_ros.core.arm.links import bodies_from_links, bodies_from_reduced, LinkBody
+from flat_planner_ros.core.arm.links import (
+    bodies_from_links,
+    bodies_from_reduced,
+    LinkBody,
+    placed_masses,
+)
 from flat_planner_ros.core.arm.planar_arm import Drive, NaturalMode, PlanarArm
 from flat_planner_ros.core.arm.samples import (
     cubic_coefficients,
@@ -106,6 +111,7 @@ __all__ = [
     'OffsetFilter',
     'OutOfReach',
     'PlanarArm',
+    'placed_masses',
     'PLUGINS',
     'SampledMotion',
     'SampleTable',

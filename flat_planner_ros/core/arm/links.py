@@ -151,6 +151,35 @@ def check_realizable(
             )
 
 
+def placed_masses(
+    length: FloatArray,
+    mass: FloatArray,
+    tip_mass: float,
+    inertia: FloatArray,
+    static_moment: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return centres of mass [m] and barycentric inertias [kg m^2] of links with given constants.
+
+    The inverse of `chain_load`, masses being known; an inertia below zero says that they cannot
+    have these constants.
+
+    Parameters
+    ----------
+    length, mass
+        Of each link, shape (m,) [m], [kg].
+    tip_mass
+        That rides at the end of the last one [kg].
+    inertia, static_moment
+        Of each link with all it carries about its joint, h_ii and s_i, shape (m,).
+
+    """
+    beyond = np.cumsum(np.append(mass, tip_mass)[::-1])[::-1][1:]
+    first = static_moment - length * beyond
+    com = np.divide(first, mass, out=np.zeros_like(first), where=mass > 0.0)
+    return com, inertia - mass * com**2 - length**2 * beyond
+
+
 class LinkBody(NamedTuple):
     """
     One rigid link with all that is fixed to it; its frame is at its joint, x along the link.

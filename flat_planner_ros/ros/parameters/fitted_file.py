@@ -18,10 +18,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from flat_planner_ros.core.arm import FlatPlannerError, PlanarArm
+from flat_planner_ros.core.arm import FlatPlannerError, placed_masses, PlanarArm
 from flat_planner_ros.core.model_fit import ModelFit
 from flat_planner_ros.ros.parameters.arm_model import changed_link_inertia
 from flat_planner_ros.ros.parameters.yaml_reader import parsed
+import numpy as np
 import yaml
 
 DIGITS = 8
@@ -85,7 +86,11 @@ def _change(block: dict[str, Any], arm: PlanarArm, before: PlanarArm) -> None:
     }
     if 'inertia_star' in model:
         model['inertia_star'] = _rounded(arm.inertia_star)
+        if _has_other_first_links(arm, before):
+            _change_first_links(model, arm, model.get('tip_mass', 0.0))
         return
+    if _has_other_first_links(arm, before):
+        _change_first_links(model, arm, float(arm.carried_mass[-2]))
     inertia = changed_link_inertia(model['link_inertia'], arm, before)
     if min(inertia) < 0.0:
         raise UnwritableModel(
@@ -93,6 +98,34 @@ def _change(block: dict[str, Any], arm: PlanarArm, before: PlanarArm) -> None:
             'the last two links are too large; give them by model.inertia_star instead'
         )
     model['link_inertia'] = _rounded(inertia)
+
+
+def _has_other_first_links(arm: PlanarArm, before: PlanarArm) -> bool:
+    """Tell whether inertias or static moments of the first links were fitted."""
+    first = slice(arm.n - 2)
+    return not (
+        np.array_equal(np.diag(arm.inertia)[first], np.diag(before.inertia)[first])
+        and np.array_equal(arm.static_moment[first], before.static_moment[first])
+    )
+
+
+def _change_first_links(model: dict[str, Any], arm: PlanarArm, tip_mass: float) -> None:
+    """Put the first links' constants into a model; masses, which no motion tells, stay."""
+    count = arm.n - 2
+    length, mass = (
+        np.array(model[name][:count], dtype=float) for name in ('link_length', 'link_mass')
+    )
+    com, inertia = placed_masses(
+        length, mass, tip_mass, np.diag(arm.inertia)[:count], arm.static_moment[:count]
+    )
+    if inertia.min() < 0.0:
+        raise UnwritableModel(
+            f'link_inertia of the first links would be {inertia} kg m^2: with the masses in the '
+            'file, which no motion in the plane tells, the links cannot have the inertias and '
+            'static moments that were found; correct link_mass or tip_mass'
+        )
+    for name, found in (('link_com', com), ('link_inertia', inertia)):
+        model[name] = [*_rounded(found), *model[name][count:]]
 
 
 def _rounded(values: Any) -> list[float]:

@@ -102,7 +102,7 @@ def _parser() -> ArgumentParser:
         description='Fit the model of an arm to recorded joint states with efforts.',
     )
     add = parser.add_argument
-    add('files', metavar='FILE', nargs='+', type=Path, help='recordings, as for analyse')
+    add('files', metavar='FILE', nargs='+', type=Path, help='recordings, as for analyse, or .csv')
     add(
         '--params-file',
         metavar='FILE',

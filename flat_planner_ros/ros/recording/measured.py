@@ -22,6 +22,7 @@ from pathlib import Path
 
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, SampleTable
 from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.ros.recording.csv_table import csv_samples, SUFFIXES
 from flat_planner_ros.ros.recording.recent_samples import (
     joined,
     nothing,
@@ -59,7 +60,7 @@ def measured(
     Parameters
     ----------
     paths
-        Recordings, each as `Recording` reads it.
+        Recordings, each as `Recording` reads it, or a table as `csv_samples` does.
     joints
         Names, the passive joint last.
     namespace, topic
@@ -77,7 +78,11 @@ def measured(
     """
     parts: list[SampleTable] = []
     for path in paths:
-        samples = _samples(Recording(path, advance), joints, namespace, topic)
+        if path.suffix.lower() in SUFFIXES:
+            samples = csv_samples(path, joints)
+            advance(1.0)
+        else:
+            samples = _samples(Recording(path, advance), joints, namespace, topic)
         if not len(samples):
             raise NothingMeasured(
                 f'{path} has no joint states of {", ".join(joints)} with efforts: the driver must '

@@ -15,9 +15,12 @@
 """A recording of a simulated arm becomes a parameter file that the nodes read."""
 
 from array import array
+from dataclasses import replace
 from pathlib import Path
 
 from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.wire import stamps
@@ -26,12 +29,14 @@ import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
-from recorded_arm import recorded
+from recorded_arm import held, recorded
 from sensor_msgs.msg import JointState
 
 pytest.importorskip('mcap')
 
 from flat_planner_ros.ros.programs import identify  # noqa: E402, I100  It needs it.
+from flat_planner_ros.ros.recording.csv_table import UnreadableTable  # noqa: E402
+from flat_planner_ros.ros.recording.measured import measured  # noqa: E402
 from flat_planner_ros.ros.recording.recording import RecordingWriter  # noqa: E402
 
 SHIPPED = Path(__file__).resolve().parents[3] / 'config' / 'arm_2dof.yaml'
@@ -85,6 +90,73 @@ def test_a_trusted_inertia_is_kept(tmp_path, capsys):
     scale = BELIEVED.inertia_star.both / TRUE.inertia_star.both
     said = float(capsys.readouterr().out.split()[3])
     assert said == pytest.approx(scale, rel=1e-3)
+
+
+def rosbag_of(path: Path, seen: Measurements) -> None:
+    """Write a directory as `ros2 bag record` does, by a library of others."""
+    rosbag2 = pytest.importorskip('rosbags.rosbag2')
+    typesys = pytest.importorskip('rosbags.typesys')
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    with rosbag2.Writer(path, version=9) as writer:
+        link = writer.add_connection('/joint_states', KIND, typestore=store)
+        for time, angles, efforts in zip(seen.times, seen.positions, seen.efforts, strict=True):
+            msg = JointState(name=['joint1', 'joint2'], position=array('d', angles))
+            msg.header.stamp = stamps.time_msg(BEGUN + time)
+            msg.effort = array('d', [*efforts, float('nan')])
+            writer.write(link, int((BEGUN + time) * 1e9), serialize_message(msg))
+
+
+def test_a_directory_of_rosbag2_and_a_table_are_the_same(tmp_path):
+    seen = recorded(TRUE, BELIEVED, until=1.0, goals=(1.0,))
+    bag, table = tmp_path / 'bag', tmp_path / 'run.csv'
+    rosbag_of(bag, seen)
+    # As PlotJuggler exports it, with a line that is not whole.
+    names = '__time,/joint_states/joint1/effort,/joint_states/joint1/position,joint2.position'
+    columns = seen.times + BEGUN, seen.efforts[:, 0], *seen.positions.T
+    lines = [','.join(f'{number:.17g}' for number in row) for row in zip(*columns, strict=True)]
+    table.write_text('\n'.join([names, *lines, '1e9,,0.1,0.2']), 'utf-8')
+    joints = 'joint1', 'joint2'
+    for found in (measured([path], joints) for path in (bag, table)):
+        assert found.times == pytest.approx(seen.times, abs=1e-6)
+        assert found.positions == pytest.approx(seen.positions, abs=1e-12)
+        assert found.efforts == pytest.approx(seen.efforts, abs=1e-12)
+    table.write_text('time;joint1.position\n0;0', 'utf-8')
+    with pytest.raises(UnreadableTable, match='no column for joint2.position'):
+        measured([table], joints)
+
+
+def test_a_vertical_arm_is_written_as_the_nodes_read_it(tmp_path):
+    source = SHIPPED.with_name('arm_4dof.yaml')
+    rows, build = planner_parameters.ROWS, planner_parameters.build
+    believed = read_settings(source, rows, build, node='flat_planner').session.arm
+    true = replace(
+        believed.with_last_links(
+            inertia_star=tuple(1.1 * each for each in believed.inertia_star),
+            stiffness=0.22,
+            damping=4e-4,
+            viscous=1e-3,
+            coulomb=2e-3,
+        ),
+        static_moment=np.append(0.97 * believed.static_moment[:2], [0.0, 0.0]),
+        viscous_friction=np.array([0.2, 0.1, 1e-3]),
+        coulomb_friction=np.array([0.1, 0.05, 2e-3]),
+        gravity=9.81,
+    )
+    coupled = true.inertia.copy()
+    coupled[0, 1] = coupled[1, 0] = 0.97 * coupled[0, 1]
+    true = replace(true, inertia=coupled)
+    seen = held(true, believed, noise=1e-5, goals=(1.5, -0.5, 1.0, -1.0), gains=(50.0, 5.0))
+    table, fitted = tmp_path / 'run.csv', tmp_path / 'arm.yaml'
+    names = [f'joint{i}.position' for i in range(1, 5)] + [f'joint{i}.effort' for i in range(1, 4)]
+    data = np.column_stack((seen.times, seen.positions, seen.efforts))
+    np.savetxt(table, data, delimiter=',', header=','.join(['time', *names]), comments='')
+    options = ['--params-file', str(source), '-o', str(fitted)]
+    assert identify.main(['identify', str(table), *options]) == 0
+    arm = read_settings(fitted, rows, build, node='flat_planner').session.arm
+    assert arm.inertia_star == pytest.approx(true.inertia_star, rel=0.01)
+    assert arm.static_moment == pytest.approx(true.static_moment, rel=0.005, abs=1e-9)
+    assert arm.inertia == pytest.approx(true.inertia, rel=0.02, abs=1e-9)
+    assert arm.viscous_friction == pytest.approx(true.viscous_friction, rel=0.1)
 
 
 def test_a_recording_without_efforts_is_refused_with_the_reason(tmp_path, capsys):
