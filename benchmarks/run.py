@@ -41,6 +41,7 @@ BENCHMARKS = (
     'model_fit',
     'tracking',
     'tracking_nodes',
+    'study',
 )
 """Modules with a function `sections`, in this order."""
 

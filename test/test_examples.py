@@ -113,6 +113,19 @@ def least_time(ran):
     assert max(ran['left'].values()) < 1e-5
 
 
+def survivors(ran):
+    shares = ran['survivors']
+    assert len(shares) == 15
+    assert all(ran['SURVIVES'] > 0.0 and 0.0 < share <= 1.0 for share in shares.values())
+    for title in ('motors, efforts alone', 'position servos'):
+        assert shares[title, 'insensitive'] == 1.0
+        assert max(shares[title, name] for name in ('polynomial', 'min_control_effort')) < 0.5
+    tracked, alone = (
+        shares[title, 'polynomial'] for title in ('motors and a tracker', 'motors, efforts alone')
+    )
+    assert tracked > 2.0 * alone
+
+
 CLAIMS = [
     first_motion,
     strategies,
@@ -126,6 +139,7 @@ CLAIMS = [
     on_a_controller,
     servo,
     least_time,
+    survivors,
 ]
 
 
@@ -156,9 +170,9 @@ def test_an_example_is_one_page_and_shown(path):
 
 
 def test_examples_are_numbered_and_use_the_public_list():
-    assert [path.name[:2] for path in EXAMPLES] == [f'{i:02}' for i in range(1, 13)]
+    assert [path.name[:2] for path in EXAMPLES] == [f'{i:02}' for i in range(1, 14)]
     for path in EXAMPLES:
         private = re.findall(r'flat_planner_ros\.core\.\w+', path.read_text('utf-8'))
         assert not private
         uses_ros = 'flat_planner_ros.ros' in path.read_text('utf-8')
-        assert uses_ros == path.stem.startswith('10')
+        assert uses_ros == path.stem.startswith(('10', '13'))

@@ -16,7 +16,7 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import Drive, FlatModel, PlanarArm
+from flat_planner_ros.core.arm import ArmStack, Drive, FlatModel, PlanarArm
 from flat_planner_ros.core.insensitive import Insensitivity, UncertaintyBox
 from flat_planner_ros.core.insensitive.insensitivity import Criterion, Nominal
 from flat_planner_ros.core.insensitive.oscillator import Oscillator
@@ -29,8 +29,8 @@ from flat_planner_ros.core.planning import (
     PlanningOptions,
     residual_of_plan,
 )
+from flat_planner_ros.core.plant import CommandTable, exact_ends, States
 import numpy as np
-from scipy.linalg import expm
 
 PERIOD = 0.005
 """Spacing of a command's points, or less: a hundredth of the motion [s]."""
@@ -176,34 +176,33 @@ def simulated(
     state: np.ndarray,
 ) -> float:
     """
-    Return the amplitude that the passive joint keeps, by exact steps of the arm's linear rows.
+    Return the amplitude that the passive joint keeps on the true arm, by its exact steps.
 
-    The state is the absolute angles of the last two links and their rates; the signal is linear
-    between its samples. The amplitude is that of the mode that the rows themselves have.
+    The state is the absolute angles of the last two links and their rates, which the links before
+    them do not feel; the signal is linear between its samples, so that angles of a servo are
+    parabolas there.
     """
-    k, c = factors[0] * arm.stiffness, factors[1] * arm.damping
     both, last = arm.inertia_star
-    free, last = both - last, factors[2] * last
-    rows = np.zeros((4, 4))
-    rows[:2, 2:] = np.eye(2)
-    rows[3] = np.array([k, -k, c, -c]) / last
-    push = np.array([0.0, 0.0, 1.0, 0.0])
-    if drive is Drive.EFFORT:
-        rows[2] = np.array([-k, k, -c, c]) / free
-        push /= free
+    true = PlanarArm.reduced(
+        inertia_star=(both + last * (factors[2] - 1.0), last * factors[2]),
+        stiffness=factors[0] * arm.stiffness,
+        damping=factors[1] * arm.damping,
+    )
     step = duration / (len(signal) - 1)
-    slopes = np.diff(signal) / step
-    if drive is Drive.POSITION:
-        signal, slopes = slopes, np.zeros_like(slopes)
-    whole = np.zeros((6, 6))
-    whole[:4, :4] = rows
-    whole[:4, 4] = push
-    whole[4, 5] = 1.0
-    jump = expm(step * whole)
-    for value, slope in zip(signal, slopes, strict=False):
-        state = jump[:4, :4] @ state + jump[:4, 4] * value + jump[:4, 5] * slope
-    # What is left swings as the passive joint does, link n-1 free or held.
-    looseness = 1.0 / last + (1.0 / free if drive is Drive.EFFORT else 0.0)
-    rates, modes = np.linalg.eig(np.array([[0.0, 1.0], [-k * looseness, -c * looseness]]))
-    shares = np.linalg.solve(modes, [state[1] - state[0], state[3] - state[2]])
-    return float(2.0 * abs(modes[0] * shares)[np.argmax(rates.imag)])
+    means = 0.5 * step * (signal[1:] + signal[:-1])
+    angles = state[0] + np.concatenate([[0.0], np.cumsum(means)])
+    table = [values[None, :, None] for values in (signal, angles, signal)]
+    commands = CommandTable(
+        spacing=np.array([step]),
+        intervals=np.array([len(signal) - 1]),
+        **dict(zip(('efforts', 'positions', 'velocities'), table, strict=True)),
+    )
+    joints = np.array([state[0], state[1] - state[0]]), np.array([state[2], state[3] - state[2]])
+    stack, begin = ArmStack.of([true]), States(*(values[None] for values in joints))
+    ends = exact_ends(stack, commands, begin, drive=drive)
+    return float(stack.swing(*ends, held=drive is Drive.POSITION)[0])
+
+
+def untold(seed: int, stop: int) -> list[Truth]:
+    """Return the cases of some seeds whose prediction is not the truth."""
+    return [found for found in map(truth, range(seed, stop)) if not found.is_told]

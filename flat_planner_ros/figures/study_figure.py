@@ -24,7 +24,7 @@ from flat_planner_ros.core.session import Motion
 from flat_planner_ros.core.study import Case
 from flat_planner_ros.figures.file_plot import plt
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 import numpy as np
 
 COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
@@ -36,8 +36,14 @@ LINES = ('-', '--', '-.', ':')
 MAP = 'viridis'
 """Colours of a map: from dark to light in print, too."""
 
+REFUSED = '#cccccc'
+"""Colour of what has no value."""
+
 WIDE = 100.0
 """Ratio of the largest to the smallest value from which a scale is logarithmic [-]."""
+
+SAME = 1e-6
+"""Difference of ratios or distances of neighbours that is none, relative to them [-]."""
 
 FEW = 60
 """Different values of an axis up to which each is a place of its own, not a cloud."""
@@ -164,7 +170,7 @@ def _curves(axis: Axes, x: Shown, value: Shown, by: Shown | None) -> None:
 
 
 def _map(axis: Axes, x: Shown, y: Shown, value: Shown) -> None:
-    """Draw the median in the cells of two axes; cells whose rows are all refused are hatched."""
+    """Draw the median in the cells of two axes; cells whose rows are all refused are grey."""
     (across, across_names), (up, up_names) = x.places, y.places
     values = np.array(value.values, dtype=float)
     (columns, column), (rows, row) = _cells(across), _cells(up)
@@ -179,8 +185,11 @@ def _map(axis: Axes, x: Shown, y: Shown, value: Shown) -> None:
     axis.figure.colorbar(drawn, ax=axis, label=f'{value.label}, median')
     refused = np.ma.masked_where(~(is_met & np.isnan(table)), np.zeros(table.shape))
     if refused.count():
-        axis.pcolor(_edges(columns), _edges(rows), refused, cmap='Greys', hatch='///', alpha=0.0)
-        axis.set_title('hatched: refused', fontsize=9)
+        axis.pcolormesh(_edges(columns), _edges(rows), refused, cmap=ListedColormap([REFUSED]))
+        axis.set_title('grey: refused', fontsize=9)
+    for set_scale, centres in ((axis.set_xscale, columns), (axis.set_yscale, rows)):
+        if _is_geometric(centres):
+            set_scale('log')
     for place, names in ((axis.set_xticks, across_names), (axis.set_yticks, up_names)):
         if names:
             place(range(len(names)), names)
@@ -224,6 +233,21 @@ def _edges(centres: FloatArray) -> FloatArray:
     """Return the borders of cells about their centres."""
     if len(centres) == 1:
         return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    if _is_geometric(centres):
+        return np.exp(_middles(np.log(centres)))
+    return _middles(centres)
+
+
+def _is_geometric(centres: FloatArray) -> bool:
+    """Tell whether the ratio of neighbours is the same throughout, and not their distance."""
+    if len(centres) < 3 or centres[0] <= 0.0:
+        return False
+    ratios, steps = np.diff(np.log(centres)), np.diff(centres)
+    return bool(np.ptp(ratios) < SAME * ratios[0] and np.ptp(steps) > SAME * steps[0])
+
+
+def _middles(centres: FloatArray) -> FloatArray:
+    """Return what lies between places, and as far beyond the first and the last."""
     middle = 0.5 * (centres[:-1] + centres[1:])
     ends = 2.0 * centres[[0, -1]] - middle[[0, -1]]
     return np.concatenate([ends[:1], middle, ends[1:]])

@@ -19,11 +19,10 @@ Plans of random cases of the whole admitted range, against multiple precision an
 from and `FUZZ_WORKERS` the processes that share them; a few are done in this one.
 """
 
-from concurrent.futures import ProcessPoolExecutor
-from itertools import repeat
-from multiprocessing import get_context
+from functools import partial
 import os
 
+from fuzz.workers import FEW, in_chunks
 import pytest
 
 CASES = int(os.environ.get('FUZZ_CASES', '200'))
@@ -31,14 +30,6 @@ CASES = int(os.environ.get('FUZZ_CASES', '200'))
 FIRST = int(os.environ.get('FUZZ_FIRST', '0'))
 
 SEED = int(os.environ.get('FUZZ_SEED', '1'))
-
-WORKERS = int(os.environ.get('FUZZ_WORKERS', '0')) or os.cpu_count()
-
-BATCH = 50
-"""Cases that a process takes at once."""
-
-FEW = 500
-"""Cases up to which other processes would take longer to start than to help."""
 
 REPORT_EVERY = 2000
 """Cases between two reports of a long run."""
@@ -50,7 +41,7 @@ def test_plans_are_exact_over_the_whole_range(capsys):
     from exactness import batch_findings, STATIONARITY, TOLERANCE
 
     total = None
-    for part in _parts(batch_findings):
+    for part in in_chunks(partial(batch_findings, SEED), FIRST, FIRST + CASES):
         total = part if total is None else total.joined(part)
         if CASES > FEW and (total.cases % REPORT_EVERY == 0 or total.cases == CASES):
             with capsys.disabled():
@@ -61,16 +52,3 @@ def test_plans_are_exact_over_the_whole_range(capsys):
     assert total.stationarity <= STATIONARITY
     assert total.gain < 1.0
     assert total.refused == ()
-
-
-def _parts(findings):
-    """Return what the batches give, as they are done."""
-    end = FIRST + CASES
-    starts = range(FIRST, end, BATCH)
-    batches = repeat(SEED), starts, [min(start + BATCH, end) for start in starts]
-    if CASES <= FEW:
-        yield from map(findings, *batches)
-        return
-    # Not forked: the threads of the test runner would be lost while they hold locks.
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context('spawn')) as pool:
-        yield from pool.map(findings, *batches)

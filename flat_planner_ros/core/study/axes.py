@@ -16,8 +16,9 @@
 Axes of a study: what its rows vary, in turn or at random, each row known by its number alone.
 
 Random numbers come from a counter: one stream per axis, keyed by the seed and the axis's name, and
-in it one place per row. So a row can be had without those before it, and an axis that is added
-changes nothing of the others.
+in it one place per repetition. So a row can be had without those before it, an axis that is added
+changes nothing of the others, and all combinations of the other axes meet the same random numbers:
+what is compared is compared on the same arms.
 """
 
 from dataclasses import dataclass
@@ -133,7 +134,7 @@ class Draws:
             )
 
     def column(self, seed: int, first: int, stop: int) -> Column:
-        """Return the values of the rows from one to before another, shape (stop - first,)."""
+        """Return the values of the repetitions from one to before another."""
         shares = shares_of(seed, self.name, first, stop)
         if self.distribution is Distribution.CHOICE:
             places = (shares * len(self.spread)).astype(np.int64)
@@ -159,7 +160,7 @@ class Axes:
     turns
         Axes that are taken in turn; the last one changes fastest.
     draws
-        Axes that are drawn anew for each row.
+        Axes that are drawn anew for each repetition, the same for all combinations.
     repeats
         Rows for each combination of the first.
     seed
@@ -208,20 +209,34 @@ class Axes:
             combination, places = np.divmod(combination, len(axis.values))
             found.update(axis.columns(places))
         for draw in self.draws:
-            found[draw.name] = draw.column(self.seed, first, stop)
+            parts = [draw.column(self.seed, *part) for part in self._repetitions(first, stop)]
+            found[draw.name] = np.concatenate(parts)[self._places(first, stop)]
         return {name: found[name] for name in self.names}
+
+    def _repetitions(self, first: int, stop: int) -> list[tuple[int, int]]:
+        """Return the numbers of the repetitions that rows are, as runs without those between."""
+        if stop - first >= self.repeats:
+            return [(0, self.repeats)]
+        begin, end = first % self.repeats, (stop - 1) % self.repeats + 1
+        return [(begin, end)] if begin < end else [(begin, self.repeats), (0, end)]
+
+    def _places(self, first: int, stop: int) -> NDArray[np.int64]:
+        """Return where in these runs each row's repetition is."""
+        if stop - first >= self.repeats:
+            return np.arange(first, stop, dtype=np.int64) % self.repeats
+        return np.arange(stop - first, dtype=np.int64)
 
 
 def shares_of(seed: int, name: str, first: int, stop: int) -> FloatArray:
     """
-    Return one random number per row, evenly in (0, 1).
+    Return one random number per place of a stream, evenly in (0, 1).
 
     Parameters
     ----------
     seed, name
         Which stream.
     first, stop
-        Rows from one to before another.
+        Places from one to before another.
 
     References
     ----------

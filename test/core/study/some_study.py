@@ -64,10 +64,10 @@ class Cases:
     """
     Makes cases of `strategy`, `drive`, `duration`, `stiffness`, `damping` and `payload`.
 
-    The first process that comes upon the `fatal` row dies.
+    The first process that comes upon a stiffness beyond `fatal` dies.
     """
 
-    fatal: int = -1
+    fatal: float = 0.0
     marks: str = ''
 
     def __call__(self, columns):
@@ -97,7 +97,7 @@ class Cases:
 
     def _die(self, columns):
         """Kill the process where that is asked for and has not happened yet."""
-        if self.fatal >= 0 and self.fatal in columns['number'].tolist():
+        if self.fatal > 0.0 and columns['stiffness'].max() > self.fatal:
             mark = Path(self.marks) / 'died'
             if not mark.exists():
                 mark.touch()
@@ -110,7 +110,6 @@ def study(cases=None, repeats=10, **more):
         turns=(
             Turns(names=('strategy',), values=tuple((s.value,) for s in STRATEGIES)),
             Turns(names=('drive',), values=tuple((d.value,) for d in Drive)),
-            Turns(names=('number',), values=tuple((float(i),) for i in range(repeats))),
         ),
         draws=tuple(
             Draws(name=name, distribution=Distribution.UNIFORM, spread=limits)
@@ -121,6 +120,7 @@ def study(cases=None, repeats=10, **more):
                 'payload': (0.0, 0.3),
             }.items()
         ),
+        repeats=repeats,
         seed=3,
     )
     return Study(axes=axes, cases=cases or Cases(), joints=JOINTS, **{'chunk': 8, **more})

@@ -69,6 +69,13 @@ def test_a_row_is_had_alone(first):
         assert values.tolist() == whole[name].tolist()[first : first + 7]
 
 
+def test_all_combinations_meet_the_same_random_numbers():
+    found = axes().columns(0, 24)
+    for name in ('k', 'c'):
+        assert found[name].tolist() == found[name].tolist()[:4] * 6
+        assert len(set(found[name])) == 4
+
+
 def test_an_axis_that_is_added_changes_nothing_of_the_others():
     one = axes()
     more = Axes(

@@ -99,7 +99,7 @@ def test_a_killed_worker_changes_nothing(whole, tmp_path):
     def executor():
         return ProcessPoolExecutor(2, mp_context=get_context('spawn'))
 
-    chosen = study(Cases(fatal=5, marks=str(tmp_path)))
+    chosen = study(Cases(fatal=1.1, marks=str(tmp_path)))
     made = rows_of(on_executor(chosen, chunks_of(0, chosen.count, 8), executor, 2))
     assert (tmp_path / 'died').exists()
     assert made == whole

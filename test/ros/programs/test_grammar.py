@@ -30,6 +30,7 @@ CODE = 'import sys; from flat_planner_ros.programs import {0}; sys.exit({0}())'
 PROGRAMS = (
     *('planner_node', 'plant_node', 'monitor_node', 'tracker_node', 'demo', 'record', 'analyse'),
     *('identify', 'excite', 'live_view', 'make_urdf', 'flat_plan', 'paper_table', 'tradeoff'),
+    'study',
 )
 MOTION = ['joint1=1', '--duration', '1']
 TRADE = [*MOTION, '--stretch', '1']
