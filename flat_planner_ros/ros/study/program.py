@@ -65,6 +65,7 @@ from flat_planner_ros.ros.study.line import flat_plan_line
 from flat_planner_ros.ros.study.results import (
     cells_of,
     is_parquet_of,
+    Lines,
     PARQUET,
     remove,
     ResultFile,
@@ -218,7 +219,7 @@ def _run(options: Namespace, study: Study, spec: Spec) -> int:
     check_writable(options.output, options.figure)
     if options.output == STANDARD_OUTPUT:
         sys.stdout.write(','.join(titles_of(study)) + '\n')
-        return _fill(options, study, lambda table: sys.stdout.write(text_of(table)), 0)
+        return _fill(options, study, sys.stdout.write, 0)
     target = Path(options.output)
     fingerprint = f'{spec.fingerprint}{"" if study.clock else ", without times"}'
     if target.suffix == PARQUET:
@@ -258,21 +259,21 @@ def _write_parquet(options: Namespace, study: Study, target: Path, fingerprint: 
     return code
 
 
-def _fill(options: Namespace, study: Study, add: Callable[[Any], object], done: int) -> int:
+def _fill(options: Namespace, study: Study, add: Callable[[str], object], done: int) -> int:
     """Do the rows from a number on; return the exit code."""
     with _engine(options) as engine, _interruptible():
         chunks = chunks_of(done, study.count, study.chunk)
-        executor, workers = engine
+        (executor, workers), work = engine, Lines(study=study)
         found = (
-            here(study, chunks)
+            here(work, chunks)
             if executor is None
-            else on_executor(study, chunks, executor, workers)
+            else on_executor(work, chunks, executor, workers)
         )
         try:
             with progress(float(study.count), 'study') as advance:
                 advance(done)
-                for chunk, table in found:
-                    add(table)
+                for chunk, lines in found:
+                    add(lines)
                     advance(chunk.stop - chunk.first)
         except KeyboardInterrupt:
             return INTERRUPTED

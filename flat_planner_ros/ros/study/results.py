@@ -22,6 +22,7 @@ a CSV file when all rows are there, as it cannot be read before its end is writt
 
 from collections.abc import Iterator, Sequence
 import csv
+from dataclasses import dataclass
 import io
 import json
 from math import isnan, nan
@@ -88,6 +89,25 @@ def _cell(value: Any) -> Any:
     return '' if value is None else value
 
 
+@dataclass(frozen=True, kw_only=True)
+class Lines:
+    """
+    Makes the rows of a study as lines of CSV, so that whoever does the work does this too.
+
+    Attributes
+    ----------
+    study
+        The study.
+
+    """
+
+    study: Study
+
+    def __call__(self, first: int, stop: int) -> str:
+        """Return the lines of the rows from one to before another."""
+        return text_of(self.study(first, stop))
+
+
 class ResultFile:
     """
     The table of a study as it grows.
@@ -132,11 +152,11 @@ class ResultFile:
             self._mark.write_text(json.dumps(mark, indent=1) + '\n', encoding='utf-8')
         self._file: TextIO = path.open('a', encoding='utf-8', newline='')
 
-    def add(self, table: Table) -> None:
+    def add(self, lines: str) -> None:
         """Write the rows of a chunk, all of them at once."""
-        self._file.write(text_of(table))
+        self._file.write(lines)
         self._file.flush()
-        self.done += len(table['row'])
+        self.done += lines.count('\n')
 
     def close(self) -> None:
         """Write no more."""
