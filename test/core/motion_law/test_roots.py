@@ -222,3 +222,18 @@ def test_far_roots_are_not_linked(oracle):
         for cluster in Spectrum(coefficients_of(oracle, squares)).clusters():
             distances = np.abs(np.roots(cluster.factor))
             assert (distances <= 15.0 + 0.7 * cluster.centre.real).all()
+
+
+@pytest.mark.parametrize('name', EXACT)
+def test_clusters_of_another_unit_of_time(oracle, name):
+    """Multiplied roots form the clusters of the equation that has them, grouped alike."""
+    squares = [complex(z) for z in EXACT[name]]
+    spectrum = Spectrum(coefficients_of(oracle, squares))
+    scales = np.array([0.01, 0.3, 1.0, 4.0, 50.0])
+    for scale, grouping in zip(scales.tolist(), spectrum.groupings(scales), strict=True):
+        multiplied = [scale**2 * z for z in squares]
+        found = spectrum.grouped(grouping, scale)
+        check(oracle, found, coefficients_of(oracle, multiplied), multiplied)
+        expected = Spectrum(coefficients_of(oracle, multiplied)).clusters()
+        sizes = sorted(len(cluster.factor) for cluster in found)
+        assert sizes == sorted(len(cluster.factor) for cluster in expected)

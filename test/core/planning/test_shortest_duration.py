@@ -323,3 +323,14 @@ def test_peaks_at_the_limit_are_reached(paper_arm):
 
     root = brentq(excess, 0.9 * found.duration, 1.1 * found.duration, xtol=1e-12)
     assert root <= found.duration <= root * (1.0 + DURATION_TOLERANCE)
+
+
+@pytest.mark.parametrize('first', [0.06, 0.9, 1.02, 30.0])
+@pytest.mark.parametrize('strategy', RATIOS)
+def test_where_a_search_starts_does_not_matter(paper_arm, strategy, first):
+    plans = motions(paper_arm, np.array([pi, 0.0]), strategy=strategy)
+    limits = JointLimits.of(2, effort=[TORQUE, np.inf])
+    found = shortest_plan(plans, limits, **RANGE, first=first)
+    expected = shortest_plan(plans, limits, **RANGE)
+    assert found.duration == pytest.approx(expected.duration, rel=DURATION_TOLERANCE)
+    assert uses_of(found, limits) <= 1.0 + 1e-9

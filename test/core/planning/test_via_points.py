@@ -196,3 +196,14 @@ def test_fifty_points(arm):
         flat = found.at(times[:-1]).flat[:, 0].T
         expected = np.array([point.values for point in via])
         assert np.abs(flat - expected).max() < 1e-11, name
+
+
+@pytest.mark.parametrize('name', STRATEGIES)
+def test_times_of_another_duration_are_near(arm, name):
+    options = STRATEGIES[name]
+    chosen = with_via_times(REQUEST, arm, options)
+    longer = chosen.stretched(1.2 * chosen.duration)
+    near = plan(with_via_times(longer, arm, options, is_near=True), arm, options)
+    anew = plan(with_via_times(longer, arm, options), arm, options)
+    assert near.cost_value == pytest.approx(anew.cost_value, rel=1e-4)
+    assert near.cost_value <= plan(longer, arm, options).cost_value
