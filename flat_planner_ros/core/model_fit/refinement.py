@@ -60,7 +60,7 @@ CONVERGED = 1e-4
 SMALLEST = 1e-7
 """Last step that is always small enough, relative to the scales [-]."""
 
-SHORTEST_STEP = 2.5e-4
+SHORTEST_STEP = 5e-4
 """Step of the integration that a model may need if the one before it does not [s]."""
 
 MOST_DAMPING = 1e8

@@ -389,5 +389,6 @@ def _estimate_remark(estimate: StiffnessEstimate | None, fit: OscillationFit) ->
     return (
         f'stiffness {estimate.stiffness:.6g} ± {estimate.stiffness_std:.2g} N m/rad and damping '
         f'{estimate.damping:.4g} ± {estimate.damping_std:.2g} N m s/rad, estimated with the '
-        f'actuated joints {estimate.case.value}'
+        f'actuated joints {estimate.case.value}, on trust in {estimate.inertia:.3g} kg m^2: what '
+        'swings tells ratios to that inertia alone'
     )
