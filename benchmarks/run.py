@@ -37,6 +37,7 @@ BENCHMARKS = (
     'via_points',
     'duration',
     'insensitive',
+    'plan_many',
     'peak',
     'model_fit',
     'tracking',

@@ -17,7 +17,7 @@ Residuals of many motions at once, each on arms of its own.
 
 Where the planned variable w is known as a function of time, nothing needs to be sampled: what
 drives link n-1 is a combination of derivatives of w, which vanish at both ends, so its integral
-against an oscillation is a polynomial in the pole times that of w' ((44b) of docs/derivation.md).
+against an oscillation is a polynomial in the pole times that of w' ((44a) of docs/derivation.md).
 """
 
 from collections.abc import Callable, Sequence
@@ -125,7 +125,7 @@ class OscillatorTable:
 
         References
         ----------
-        (44b) of docs/derivation.md.
+        (44a) of docs/derivation.md.
 
         """
         poles = self.poles(factors)

@@ -250,7 +250,7 @@ def half_quadrature(rates: ComplexArray) -> tuple[FloatArray, FloatArray]:
     counts = np.ceil(parts * min(1.0, MAX_PANELS / parts.sum())).astype(int)
     widths = np.repeat(np.diff(edges) / counts, counts)
     starts = np.cumsum(widths) - widths
-    nodes, weights = _gauss()
+    nodes, weights = gauss_panel()
     times = starts[:, None] + np.multiply.outer(widths, nodes)
     return times.ravel(), np.multiply.outer(widths, weights).ravel()
 
@@ -300,7 +300,7 @@ def _panels(depth: int) -> FloatArray:
 
 
 @cache
-def _gauss() -> tuple[FloatArray, FloatArray]:
+def gauss_panel() -> tuple[FloatArray, FloatArray]:
     """Return the nodes and weights of one panel from 0 to 1."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES_PER_PANEL)
     return 0.5 * (nodes + 1.0), 0.5 * weights

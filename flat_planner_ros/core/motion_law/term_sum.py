@@ -158,7 +158,7 @@ class TermSum:
         # Else the product of the tables, or a multiple of it, would leave the range of doubles.
         fall[exponents.real < -VANISHING] = 0.0
         fine = np.empty((len(fall), 2, 2, size))
-        _split(fall[:, :size], fine[:, 0])
+        split_parts(fall[:, :size], fine[:, 0])
         fine[:, 1] = fine[:, 0, :, ::-1]
         blocks = (len(places) - size) // 2
         coarse = fall[:, size:].reshape(2 * len(fall), blocks).T.copy()
@@ -252,7 +252,7 @@ def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray)
         if count:
             fall = -decays[..., None, None] * distances
             np.exp(fall, out=fall)
-            _split(fall, basis[..., : 4 * count, :].reshape(*decays.shape, 2, 2, places))
+            split_parts(fall, basis[..., : 4 * count, :].reshape(*decays.shape, 2, 2, places))
         rows = basis.swapaxes(-2, 0)
         _fill_powers(rows[4 * count :], 0.5 * (distances[0] - distances[1]))
         sums: FloatArray = factors @ basis
@@ -339,7 +339,7 @@ def _fill_powers(table: FloatArray, x: FloatArray) -> None:
         known += more
 
 
-def _split(fall: ComplexArray, parts: FloatArray) -> None:
+def split_parts(fall: ComplexArray, parts: FloatArray) -> None:
     """Write Re and -Im of exponentials, shape (..., m), into a table, shape (..., 2, m)."""
     parts[..., 0, :] = fall.real
     np.negative(fall.imag, out=parts[..., 1, :])

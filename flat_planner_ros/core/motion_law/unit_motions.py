@@ -167,7 +167,7 @@ def by_parts(certificates: Certificates, poles: ComplexArray) -> ComplexArray:
 
     References
     ----------
-    (44a) of docs/derivation.md.
+    (44b) of docs/derivation.md.
 
     """
     inverse = 1.0 / poles

@@ -14,17 +14,29 @@
 
 """Unit motions of many equations: each in the form that suits its roots, or left out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.extremal import Mean
+from flat_planner_ros.core.motion_law.simple_roots import simple_roots, SimpleRoots
+from flat_planner_ros.core.motion_law.unit_exponentials import UnitExponentials
 from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, speeds
 from flat_planner_ros.core.motion_law.unit_series import FASTEST, UnitSeries
 import numpy as np
 
 CHUNK = 512
 """Motions that are solved together, few enough for the caches of a processor."""
+
+SORTED = 16 * CHUNK
+"""Equations that are sorted together by the kinds of their roots."""
+
+EXPONENTIALS_FROM = 14.0
+"""
+Speed from which exponentials are tried first, in units of 2 / duration [-].
+
+A series then loses five digits, and takes as long.
+"""
 
 
 class UnitMotions(Protocol):
@@ -67,30 +79,65 @@ def unit_table(coefficients: FloatArray, tolerance: float) -> Iterator[UnitGroup
 
     """
     fastest = speeds(coefficients)
-    slower = 0.0
+    slow, fast = np.flatnonzero(fastest < EXPONENTIALS_FROM), fastest >= EXPONENTIALS_FROM
+    yield from _as_series(coefficients, slow, fastest, tolerance)
+    rows = np.flatnonzero(fast)
+    for part in _chunks(rows, SORTED):
+        for roots in simple_roots(coefficients[part]):
+            for chunk in _chunks(np.arange(len(roots.rows)), CHUNK):
+                some = roots.chosen(chunk)
+                found = _certified(_exponentials(some), coefficients, part[some.rows], tolerance)
+                if found is not None:
+                    fast[found.rows] = False
+                    yield found
+    yield from _as_series(coefficients, np.flatnonzero(fast), fastest, tolerance)
+
+
+def _as_series(
+    coefficients: FloatArray, rows: IntArray, fastest: FloatArray, tolerance: float
+) -> Iterator[UnitGroup]:
+    """Return the motions of some equations as series of as many terms as they need."""
+    slower = -1.0
     for terms, limit in FASTEST.items():
-        rows = np.flatnonzero((slower <= fastest) & (fastest < limit))
-        for chunk in chunks(rows):
-            yield from _certified(coefficients, chunk, terms, tolerance)
+        some = rows[(slower < fastest[rows]) & (fastest[rows] <= limit)]
+        for chunk in _chunks(some, CHUNK):
+            found = _certified(_series(terms), coefficients, chunk, tolerance)
+            if found is not None:
+                yield found
         slower = limit
 
 
-def chunks(rows: IntArray) -> Sequence[IntArray]:
-    """Return indices in parts of at most `CHUNK`."""
-    return np.array_split(rows, -(-len(rows) // CHUNK)) if len(rows) else []
+Form = Callable[[FloatArray], UnitMotions]
+"""From equations to their motions."""
+
+
+def _series(terms: int) -> Form:
+    """Return the form of series with a number of terms."""
+    return lambda coefficients: UnitSeries.of(coefficients, terms)
+
+
+def _exponentials(roots: SimpleRoots) -> Form:
+    """Return the form of exponentials with given roots."""
+    return lambda coefficients: UnitExponentials.of(coefficients, roots)
+
+
+def _chunks(rows: IntArray, most: int) -> Sequence[IntArray]:
+    """Return indices in parts of limited size."""
+    return np.array_split(rows, -(-len(rows) // most)) if len(rows) else []
 
 
 def _certified(
-    coefficients: FloatArray, rows: IntArray, terms: int, tolerance: float
-) -> Iterator[UnitGroup]:
-    """Return the motions of some equations that pass; none where an equation is singular."""
+    form: Form, coefficients: FloatArray, rows: IntArray, tolerance: float
+) -> UnitGroup | None:
+    """Return the motions of some equations that pass; None where none does."""
     try:
-        motions = UnitSeries.of(coefficients[rows], terms)
+        motions = form(coefficients[rows])
     except np.linalg.LinAlgError:
-        return
+        return None  # An equation is singular: all of them are left out.
     found = motions.certificates
     passes = np.maximum(found.boundary_residual, found.optimality_residual) <= tolerance
     if passes.all():
-        yield UnitGroup(rows, motions)
-    elif passes.any():
-        yield UnitGroup(rows[passes], motions.chosen(np.flatnonzero(passes)))
+        return UnitGroup(rows, motions)
+    if not passes.any():
+        return None
+    return UnitGroup(rows[passes], motions.chosen(np.flatnonzero(passes)))

@@ -118,6 +118,67 @@ def test_each_row_is_the_plan_of_its_numbers(name, model):
         assert table.plan(row).request.duration == durations[row]
 
 
+def hard_arm(ratio):
+    """Return an arm with the paper's inertias and spring and another damping ratio."""
+    return replace(ARM, damping=ARM.damping * ratio / ARM.natural_mode().damping_ratio)
+
+
+FOURFOLD = np.poly([-2.0] * 4 + [0.0, 0.0])[:-1]
+"""(z + 2)^4 z^2, descending, without its constant: a_6 ... a_1 of an equation, signs aside."""
+
+HARD = {
+    'twelve roots around zero': (ARM, STRATEGIES['effort'], 0.02),
+    'some around zero': (ARM, STRATEGIES['effort'], 0.45),
+    'fourfold root': (
+        ARM,
+        PlanningOptions(strategy=Strategy.CUSTOM, custom=np.diag(np.abs(FOURFOLD)[::-1])),
+        9.0,
+    ),
+    'strong damping': (hard_arm(0.8), STRATEGIES['mixed'], 1.5),
+    'no damping': (hard_arm(0.0), STRATEGIES['effort'], 1.5),
+    'no damping, large weight': (
+        hard_arm(0.0),
+        PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT, effort_weight=20.0),
+        2.0,
+    ),
+    'thin boundary layers': (
+        ARM,
+        PlanningOptions(strategy=Strategy.MIXED, effort_weight=30.0, energy_weight=30.0),
+        6.0,
+    ),
+    'many periods': (ARM, STRATEGIES['polynomial'], 60.0),
+}
+
+
+@pytest.mark.parametrize('name', HARD)
+def test_hard_cases_are_planned_and_predicted_like_single_plans(name):
+    arm, options, duration = HARD[name]
+    table = plan_many(arm, [1.0, -2.0], [duration, 1.1 * duration], options)
+    assert table.is_certified.all()
+    single = plan(request(-2.0, 1.1 * duration), arm, options)
+    times = np.linspace(0.0, single.duration, 101)
+    found, reached = table.planned(np.array([1]), 100)[0], single.at(times).planned
+    assert (peaks_of(found - reached) <= CLOSE * peaks_of(reached)).all()
+    np.testing.assert_allclose(table.rms_effort[1], single.rms_effort, rtol=CLOSE)
+    np.testing.assert_allclose(table.peak_effort[1], single.peak_effort, rtol=PEAK)
+    # Layers and steep beginnings take more than a thousand pieces of effort.
+    samples = single.at(np.linspace(0.0, single.duration, 20001))
+    expected = predict_residual(
+        arm, samples.driving_effort, single.duration, options.insensitivity.box
+    )
+    left = table.residuals
+    assert left.worst[1] == pytest.approx(expected.worst, rel=SAMPLED, abs=NOTHING)
+    assert left.nominal[1] == pytest.approx(expected.nominal, rel=SAMPLED, abs=NOTHING)
+
+
+def test_few_rows_are_planned_one_by_one():
+    rng = np.random.default_rng(9)
+    count = 300
+    durations = np.exp(rng.uniform(np.log(0.1), np.log(8.0), count))
+    for name in ('polynomial', 'effort', 'energy', 'mixed'):
+        assert not plan_many(ARM, 1.0, durations, STRATEGIES[name]).singles
+
+
 @pytest.mark.parametrize('drive', Drive)
 @pytest.mark.parametrize('name', STRATEGIES)
 def test_predicted_residuals_are_those_of_single_plans(name, drive):
@@ -134,7 +195,7 @@ def test_predicted_residuals_are_those_of_single_plans(name, drive):
         found = table.residuals
         assert found.nominal[row] == pytest.approx(single.nominal, rel=SAMPLED, abs=allowed)
         assert found.worst[row] == pytest.approx(single.worst, rel=SAMPLED, abs=allowed)
-        assert found.miss[row] == pytest.approx(single.miss, rel=1e-6)
+        assert found.miss[row] == pytest.approx(single.miss, rel=1e-5)
 
 
 @pytest.mark.parametrize('drive', Drive)
