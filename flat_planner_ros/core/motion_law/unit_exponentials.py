@@ -34,7 +34,12 @@ from flat_planner_ros.core.motion_law.simple_roots import SimpleRoots
 from flat_planner_ros.core.motion_law.term_sum import grid_blocks, split_parts, VANISHING
 from flat_planner_ros.core.motion_law.terms import series_derivatives
 from flat_planner_ros.core.motion_law.transforms import exponential_transform, power_transform
-from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, mirrored_grid
+from flat_planner_ros.core.motion_law.unit_motions import (
+    Certificates,
+    IntArray,
+    mirrored_grid,
+    Nodes,
+)
 import numpy as np
 
 TABLES_KEPT = 16
@@ -135,15 +140,20 @@ class UnitExponentials:
     def means(self, rows: FloatArray) -> Mean:
         """Return mean squares and peaks, as `UnitMotion.mean`, rows of shape (p, m, 7)."""
         square, peak = np.zeros((2, *rows.shape[:2]))
+        for places, weights, halves in self.at_nodes(rows):
+            square[places] += 0.5 * sum(half**2 @ weights for half in halves)
+            for half in halves:
+                peak[places] = np.maximum(peak[places], np.abs(half).max(axis=2))
+        return Mean(square, peak)
+
+    def at_nodes(self, rows: FloatArray) -> Iterator[Nodes]:
+        """Return combinations of derivatives at nodes of a quadrature, octave by octave."""
         finenesses = octaves_for(self.decays)
         for fineness in np.unique(finenesses, axis=0).tolist():
             places = np.flatnonzero((finenesses == fineness).all(axis=1))
             some = self.chosen(places)
             for weights, halves in some._on_octaves(rows[places], *fineness):
-                square[places] += 0.5 * sum(half**2 @ weights for half in halves)
-                for half in halves:
-                    peak[places] = np.maximum(peak[places], np.abs(half).max(axis=2))
-        return Mean(square, peak)
+                yield Nodes(places, weights, halves)
 
     def on_even_grid(self, rows: FloatArray, intervals: int) -> FloatArray:
         """Return combinations of derivatives at even times, as `UnitSeries.on_even_grid`."""

@@ -21,6 +21,7 @@ an integral over their velocity, which is smooth at both ends.
 
 from dataclasses import dataclass, fields
 from math import comb
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
@@ -43,6 +44,26 @@ FEWEST_INTERVALS = 16
 
 EULER_MACLAURIN = (1.0 / 30240.0, -1.0 / 1209600.0, 1.0 / 47900160.0)
 """B_2k / (2 k)! for k = 3, 4, 5: the ends' share of a trapezoidal sum."""
+
+
+class Nodes(NamedTuple):
+    """
+    Some motions at some nodes of a quadrature over half a motion.
+
+    Attributes
+    ----------
+    rows
+        Which motions, shape (q,).
+    weights
+        Of sum 1 for all nodes of a motion together, shape (m,) [-].
+    halves
+        Combinations of derivatives in the first half, and at the mirrored places, (q, r, m) each.
+
+    """
+
+    rows: IntArray
+    weights: FloatArray
+    halves: tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

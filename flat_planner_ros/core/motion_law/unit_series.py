@@ -22,6 +22,7 @@ whatever its roots have in common ((30a) of docs/derivation.md). Roots that are 
 terms do not pass the certificate, and are left to exponentials.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -40,6 +41,7 @@ from flat_planner_ros.core.motion_law.unit_motions import (
     Certificates,
     IntArray,
     mirrored_grid,
+    Nodes,
     transform_intervals,
     trapezoid,
 )
@@ -134,10 +136,10 @@ def _at_probes(terms: int) -> FloatArray:
 
 
 @lru_cache(maxsize=TABLES_KEPT)
-def _at_nodes(terms: int) -> tuple[FloatArray, FloatArray]:
-    """Return odd and even Legendre polynomials where peaks are looked for, (size / 2, m)."""
-    times, _ = half_quadrature(np.array([complex(FASTEST[terms])]))
-    return _parities(times - 1.0, 2 * terms + SOLUTIONS)
+def _at_nodes(terms: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return weights of a quadrature, odd and even Legendre polynomials there, (size / 2, m)."""
+    times, weights = half_quadrature(np.array([complex(FASTEST[terms])]))
+    return locked(weights), *_parities(times - 1.0, 2 * terms + SOLUTIONS)
 
 
 @lru_cache(maxsize=TABLES_KEPT)
@@ -215,11 +217,18 @@ class UnitSeries:
     def means(self, rows: FloatArray) -> Mean:
         """Return mean squares and peaks, as `UnitMotion.mean`, rows of shape (p, m, 7)."""
         odd, even = self._combined(rows)
-        at_odd, at_even = _at_nodes(self.terms)
+        _, at_odd, at_even = _at_nodes(self.terms)
         degrees = np.arange(float(2 * odd.shape[2]))
         square = odd**2 @ (1.0 / (2.0 * degrees[1::2] + 1.0))
         square += even**2 @ (1.0 / (2.0 * degrees[::2] + 1.0))
         return Mean(square, (np.abs(odd @ at_odd) + np.abs(even @ at_even)).max(axis=2))
+
+    def at_nodes(self, rows: FloatArray) -> Iterator[Nodes]:
+        """Return combinations of derivatives at the nodes of a quadrature, rows (p, m, 7)."""
+        odd, even = self._combined(rows)
+        weights, at_odd, at_even = _at_nodes(self.terms)
+        odd, even = odd @ at_odd, even @ at_even
+        yield Nodes(np.arange(len(rows)), weights, (even + odd, even - odd))
 
     def on_even_grid(self, rows: FloatArray, intervals: int) -> FloatArray:
         """

@@ -21,7 +21,7 @@ from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.extremal import Mean
 from flat_planner_ros.core.motion_law.simple_roots import simple_roots, SimpleRoots
 from flat_planner_ros.core.motion_law.unit_exponentials import UnitExponentials
-from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, speeds
+from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, Nodes, speeds
 from flat_planner_ros.core.motion_law.unit_series import FASTEST, UnitSeries
 import numpy as np
 
@@ -51,6 +51,9 @@ class UnitMotions(Protocol):
 
     def means(self, rows: FloatArray, /) -> Mean:
         """Return mean squares and peaks of combinations of derivatives, rows (p, m, 7)."""
+
+    def at_nodes(self, rows: FloatArray, /) -> Iterator[Nodes]:
+        """Return combinations of derivatives at nodes of a quadrature, rows (p, m, 7)."""
 
     def on_even_grid(self, rows: FloatArray, intervals: int, /) -> FloatArray:
         """Return combinations of derivatives at even times, (p, m, intervals + 1)."""

@@ -14,7 +14,7 @@
 
 """A table of certified plans: one motion in each row, its figures and what it leaves behind."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from flat_planner_ros.core.arm import Drive, FlatPlannerError, FloatArray, locke
 from flat_planner_ros.core.insensitive import misses, ResidualTable
 from flat_planner_ros.core.motion_law import JET_ORDER
 from flat_planner_ros.core.plan_table.arm_table import ArmTable, IntArray
+from flat_planner_ros.core.plan_table.joint_figures import JointMotion
 from flat_planner_ros.core.plan_table.problem_table import ProblemTable
 from flat_planner_ros.core.plan_table.single_plans import (
     driving_signal,
@@ -151,20 +152,39 @@ class PlanTable:
         """
         count, joints = len(self), self.arms.arms[0].n
         rms, peak, velocity = np.full((3, count, joints), np.nan)
+        rows = np.flatnonzero(self.problem >= 0)
         if joints == 2 and not self.options.compensate_friction:
-            rows = np.flatnonzero(self.problem >= 0)
-            means = self.problems.means()
-            squares, peaks = (values[self.problem[rows]] for values in means)
+            squares, peaks = (values[self.problem[rows]] for values in self.problems.means())
             way = np.abs(self.distances[rows, 0])
             rms[rows], peak[rows] = 0.0, 0.0
             rms[rows, 0], peak[rows, 0] = way * np.sqrt(squares[:, 0]), way * peaks[:, 0]
             velocity[rows] = way[:, None] * peaks[:, 1:]
-            left = list(self.singles)
         else:
-            left = np.flatnonzero(self.is_certified).tolist()
-        for row in left:
-            rms[row], peak[row], velocity[row] = figures_of(self.plan(row))
+            for places, motion in self._joint_motions(rows):
+                rms[places], peak[places], velocity[places] = motion.figures()
+        for row, planned in self.singles.items():
+            rms[row], peak[row], velocity[row] = figures_of(planned)
         return Figures(locked(rms), locked(peak), locked(velocity))
+
+    def _joint_motions(self, rows: IntArray) -> Iterator[tuple[IntArray, JointMotion]]:
+        """Return the motions of rows, those of one arm and form together."""
+        for places, problems, motions in self.problems.parts(self.problem[rows]):
+            arms = self.problems.arm[problems]
+            for arm in np.unique(arms).tolist():
+                some = np.flatnonzero(arms == arm)
+                chosen = rows[places[some]]
+                yield (
+                    chosen,
+                    JointMotion(
+                        arm=self.arms.arms[arm],
+                        motions=motions.chosen(some),
+                        rates=self.problems.rates(problems[some]),
+                        rows=self.arms.rows[arm],
+                        starts=self.starts[chosen],
+                        distances=self.distances[chosen],
+                        has_friction=self.options.compensate_friction,
+                    ),
+                )
 
     @cached_property
     def residuals(self) -> ResidualTable:

@@ -220,6 +220,38 @@ def test_the_residual_on_a_true_arm_is_that_of_the_effort_on_it(drive):
         assert missed[row] == pytest.approx(abs(reached - ways[row]), abs=1e-12)
 
 
+def test_every_joint_of_a_long_arm_has_its_figures():
+    """In a vertical plane, where efforts depend on the pose, without friction and with it."""
+    arm = PlanarArm.reduced(
+        inertia_star=(6.4e-4, 3.3e-5),
+        stiffness=3e-3,
+        damping=2e-5,
+        link_length=[0.2, 0.15],
+        link_com=[0.1, 0.08],
+        link_mass=[0.3, 0.2],
+        link_inertia=[1e-3, 4e-4],
+        tip_mass=0.1,
+        gravity=9.81,
+        viscous_friction=[1e-3, 1e-3, 1e-4],
+        coulomb_friction=[1e-2, 1e-2, 1e-3],
+    )
+    rng = np.random.default_rng(11)
+    ways, starts = rng.uniform(-1.5, 1.5, (2, 8, 3))
+    durations = np.geomspace(0.3, 4.0, 8)
+    for has_friction in (False, True):
+        options = PlanningOptions(compensate_friction=has_friction)
+        table = plan_many(arm, ways, durations, options, starts=starts)
+        assert not table.singles
+        planned = table.planned(np.arange(8), 50)
+        for row in range(8):
+            single = table.plan(row)
+            np.testing.assert_allclose(table.rms_effort[row], single.rms_effort, rtol=1e-4)
+            np.testing.assert_allclose(table.peak_effort[row], single.peak_effort, rtol=5e-3)
+            np.testing.assert_allclose(table.peak_velocity[row], single.peak_velocity, rtol=PEAK)
+            reached = single.at(np.linspace(0.0, durations[row], 51)).planned
+            assert (peaks_of(planned[row] - reached) <= CLOSE * peaks_of(reached)).all()
+
+
 def test_a_row_that_is_refused_has_its_reason_and_keeps_its_place():
     lopsided = replace(ARM, static_moment=np.array([0.0, 1e-3]), carried_mass=np.array([1.0, 1.0]))
     arms = [ARM, lopsided, ARM, ARM]
