@@ -72,6 +72,7 @@ MESSAGES_ALLOWED = {
     'stamps.py': 'stamps to seconds and back',
     'exciter.py': 'sends goals and reads verdicts as any user does',
     'paper_experiment.py': 'sends goals and reads reports as any user does',
+    'tracked_experiment.py': 'calls a service of the tracker besides',
 }
 """Patterns of the files that import message packages, each with its reason."""
 

@@ -27,6 +27,9 @@ import numpy as np
 MILLI = 1e3
 """Residuals are drawn in mrad."""
 
+Sent = tuple[FloatArray, FloatArray]
+"""Times [s], shape (m,), and efforts [N m], shape (m, k)."""
+
 TITLE_WIDTH = 110
 """Characters in a line of the title."""
 
@@ -37,6 +40,8 @@ def draw(
     times: FloatArray,
     positions: FloatArray,
     efforts: FloatArray,
+    tracked: Sent,
+    pushes: Sent,
     path: Path,
 ) -> None:
     """
@@ -50,6 +55,8 @@ def draw(
         Times of the samples [s], shape (m,).
     positions, efforts
         Measured [rad], [N m], shape (m, n); NaN where unknown.
+    tracked, pushes
+        Sent by a tracker, and by who pushed the arm: times [s] and efforts [N m].
     path
         File to write; its suffix chooses the format.
 
@@ -62,6 +69,9 @@ def draw(
     _draw_positions(axes[0], motion, elapsed, positions, last)
     _draw_residual(axes[1], report, elapsed, MILLI * (positions - planned), end)
     _draw_efforts(axes[2], motion, elapsed, efforts)
+    _draw_tracked(axes[2], motion, tracked)
+    for time in pushes[0] - motion.start:
+        axes[1].axvline(time, color='C8', linewidth=0.6, zorder=0)
     for axis in axes:
         axis.axvline(0.0, color='black', linewidth=0.6)
         axis.axvline(end, color='black', linewidth=0.6)
@@ -128,6 +138,16 @@ def _draw_efforts(
         axis.plot([], [], '--', color='black', linewidth=0.9, label='planned')
     axis.set_ylabel('effort [N m]')
     if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc='best', fontsize=8)
+
+
+def _draw_tracked(axis: Axes, motion: PlannedMotion, tracked: Sent) -> None:
+    """Draw what a tracker has sent; its distance from the plan is what feedback has added."""
+    times, efforts = tracked
+    for joint, name in enumerate(motion.joint_names[:-1][: efforts.shape[1]]):
+        style = {'color': f'C{joint + 3}', 'linewidth': 0.8}
+        _plot(axis, times - motion.start, efforts[:, joint], label=f'{name} tracker', **style)
+    if times.size:
         axis.legend(loc='best', fontsize=8)
 
 

@@ -15,7 +15,8 @@
 """
 The paper's numerical example: its strategies, its scenarios and the numbers that it prints.
 
-`BEYOND` adds what the paper does not have: a plant that is 10 % softer, too, and three methods.
+`BEYOND` adds what the paper does not have: a plant that is 10 % softer, too, three methods, and
+feedback on arms that differ further.
 """
 
 from collections.abc import Mapping
@@ -46,6 +47,10 @@ class Scenario(NamedTuple):
         Damping known to the planner over the arm's nominal one [-].
     stiffness_scale, damping_scale
         The plant's stiffness and damping over the nominal ones [-].
+    inertia_scale
+        The plant's inertias over the nominal ones [-].
+    viscous_friction, coulomb_friction
+        Of the plant's joint 1, not in the model [N m s/rad], [N m].
 
     """
 
@@ -54,6 +59,9 @@ class Scenario(NamedTuple):
     damping_factor: float
     stiffness_scale: float
     damping_scale: float
+    inertia_scale: float = 1.0
+    viscous_friction: float = 0.0
+    coulomb_friction: float = 0.0
 
 
 SCENARIOS = (
@@ -64,6 +72,17 @@ SCENARIOS = (
 
 SOFTER = Scenario(4, 'stiffness and damping -10 % in the plant', 1.0, 0.9, 0.9)
 """The other side of scenario 3, and the worse one."""
+
+FURTHER = (
+    Scenario(5, 'stiffness and damping +25 % in the plant', 1.0, 1.25, 1.25),
+    Scenario(6, 'stiffness and damping -25 % in the plant', 1.0, 0.75, 0.75),
+    Scenario(7, 'inertias +10 % in the plant', 1.0, 1.0, 1.0, inertia_scale=1.1),
+    Scenario(8, 'inertias -10 % in the plant', 1.0, 1.0, 1.0, inertia_scale=0.9),
+    Scenario(
+        9, 'friction in the plant', 1.0, 1.0, 1.0, viscous_friction=2e-4, coulomb_friction=5e-4
+    ),
+)
+"""Arms that are carried on with feedback alone."""
 
 STRATEGIES = ('polynomial', 'min_control_effort', 'min_potential_energy')
 """In the order of the paper's table, named as the planner's parameter `strategy`."""
@@ -86,12 +105,15 @@ class Method(NamedTuple):
     learns
         Whether the row is the second of two motions, after the estimate from the first has been
         adopted.
+    is_tracked
+        Whether the tracker carries the motion out.
 
     """
 
     name: str
     parameters: Mapping[str, str | float]
     learns: bool = False
+    is_tracked: bool = False
 
 
 def _method(name: str, strategy: str, flat_model: str, learns: bool = False) -> Method:
@@ -106,6 +128,7 @@ METHODS = tuple(_method(strategy, strategy, 'approximate') for strategy in STRAT
 EXACT = _method('exact', 'min_control_effort', 'exact')
 INSENSITIVE = _method('insensitive', 'insensitive', 'exact')
 SELF_TUNED = _method('self-tuned, 2nd move', 'min_control_effort', 'exact', learns=True)
+TRACKED = EXACT._replace(name='tracked', is_tracked=True)
 
 CASES = tuple((scenario, method) for scenario in SCENARIOS for method in METHODS)
 """The rows of the paper's table."""
@@ -116,6 +139,7 @@ BEYOND = (
     *CASES[6:],
     *((SCENARIOS[2], method) for method in (EXACT, INSENSITIVE, SELF_TUNED)),
     *((SOFTER, method) for method in (*METHODS, EXACT, INSENSITIVE, SELF_TUNED)),
+    *((scenario, TRACKED) for scenario in (*SCENARIOS[1:], SOFTER, *FURTHER)),
 )
 """The rows of the paper's table and those that it does not have."""
 
@@ -131,6 +155,13 @@ PRINTED = {
     (3, 'min_potential_energy'): (0.0079, 0.062),
 }
 """The paper's table: RMS effort [N m] and amplitude at the end [rad] by scenario and strategy."""
+
+
+BAND = 5e-3
+"""Swing and distance from the goal below which an arm has settled [rad]."""
+
+SEEN = 0.3
+"""Time for which it has to be seen so [s]: half a swing and more."""
 
 
 class Recording(NamedTuple):
@@ -169,6 +200,8 @@ class Result(NamedTuple):
         The motion.
     drive
         What moved joint 1.
+    peak_ratio
+        Largest effort of joint 1 over the largest that was planned [-].
 
     """
 
@@ -178,6 +211,27 @@ class Result(NamedTuple):
     amplitude: float
     recording: Recording
     drive: Drive = Drive.EFFORT
+    peak_ratio: float = 1.0
+
+    @property
+    def miss(self) -> float:
+        """Return the distance of joint 1 from its goal at the end of the motion [rad]."""
+        return float(self._after()[1][0, 0])
+
+    @property
+    def settling_time(self) -> float | None:
+        """Return the time after the motion until all stays within `BAND` [s]."""
+        times, errors = self._after()
+        off = np.flatnonzero((errors > BAND).any(axis=1))
+        if not off.size:
+            return 0.0
+        return float(times[off[-1]]) if times[-1] - times[off[-1]] > SEEN else None
+
+    def _after(self) -> tuple[FloatArray, FloatArray]:
+        """Return times after the motion [s], and how far both joints are off [rad]."""
+        after = self.recording.times >= DURATION
+        errors = np.abs(self.recording.positions[after] - np.array((GOAL_ANGLE, 0.0)))
+        return self.recording.times[after] - DURATION, errors
 
     @property
     def printed(self) -> tuple[float, float] | None:

@@ -15,10 +15,13 @@
 """The paper's figures, drawn with matplotlib (extra `plot`)."""
 
 from collections.abc import Sequence
+from math import ceil
 from pathlib import Path
 
 from flat_planner_ros.figures.file_plot import plt, with_gaps
-from flat_planner_ros.figures.paper_example import DURATION, Result
+from flat_planner_ros.figures.paper_example import DURATION, Result, Scenario
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 SHOWN_AFTER = 1.0
@@ -34,15 +37,19 @@ STYLES = {
     'exact': ('C1', '-'),
     'insensitive': ('C4', '-'),
     'self-tuned, 2nd move': ('C5', '--'),
+    'tracked': ('C6', '-.'),
 }
 """Colour and line of each method, those of the paper as there."""
+
+COLUMNS = 5
+"""Scenarios beside each other; more go below."""
 
 ROWS = ('$q_1$ [rad]', '$q_2$ [rad]', r'$\tau_1$ [N m]')
 
 
 def draw(results: Sequence[Result], path: Path) -> None:
     """
-    Draw q1, q2 and the effort over time, one column per scenario.
+    Draw q1, q2 and the effort over time, one column per scenario, `COLUMNS` of them in a band.
 
     Parameters
     ----------
@@ -53,39 +60,61 @@ def draw(results: Sequence[Result], path: Path) -> None:
 
     """
     scenarios = list(dict.fromkeys(result.scenario for result in results))
+    columns = min(len(scenarios), COLUMNS)
+    bands = ceil(len(scenarios) / columns)
     figure, axes = plt.subplots(
-        len(ROWS),
-        len(scenarios),
-        figsize=(4.0 * len(scenarios) + 1.0, 7.5),
+        bands * len(ROWS),
+        columns,
+        figsize=(4.0 * columns + 1.0, 7.5 * bands),
         sharex=True,
-        sharey='row',
         squeeze=False,
     )
-    for column, scenario in enumerate(scenarios):
-        axes[0, column].set_title(f'Scenario {scenario.number}: {scenario.title}', fontsize=10)
-        for result in results:
-            if result.scenario != scenario:
-                continue
-            colour, line = STYLES[result.strategy]
-            times, positions, efforts = with_gaps(*result.recording)
-            for row, values in enumerate((positions[:, 0], positions[:, 1], efforts)):
-                axes[row, column].plot(times, values, line, color=colour, label=result.strategy)
-        for row, label in enumerate(ROWS):
-            axis = axes[row, column]
-            axis.axvline(DURATION, color='black', linewidth=0.8)
-            axis.grid(alpha=0.3)
-            if column == 0:
+    for index, scenario in enumerate(scenarios):
+        band, column = divmod(index, columns)
+        column_axes = list(axes[band * len(ROWS) : (band + 1) * len(ROWS), column])
+        _draw_scenario(column_axes, scenario, results)
+        if column == 0:
+            for axis, label in zip(column_axes, ROWS, strict=True):
                 axis.set_ylabel(label)
-        axes[-1, column].set_xlabel('time [s]')
-        axes[-1, column].set_xlim(0.0, DURATION + SHOWN_AFTER)
-        axes[-1, column].xaxis.set_major_locator(MultipleLocator(TICKS))
-    lines = [
-        line for axis in axes[0] for line in zip(*axis.get_legend_handles_labels(), strict=True)
-    ]
-    handles = {label: handle for handle, label in lines}
+    for axis in axes[-len(ROWS) :, len(scenarios) - (bands - 1) * columns :].flat:
+        axis.axis('off')
+    for row in range(len(ROWS)):
+        _share_range(list(axes[row :: len(ROWS)].flat))
+    handles: dict[str, Artist] = {}
+    for axis in axes[:: len(ROWS)].flat:
+        shown, labels = axis.get_legend_handles_labels()
+        handles |= dict(zip(labels, shown, strict=True))
     figure.legend(
-        handles.values(), handles.keys(), loc='lower center', ncols=len(STYLES), frameon=False
+        list(handles.values()), list(handles), loc='lower center', ncols=len(STYLES), frameon=False
     )
-    figure.tight_layout(rect=(0.0, 0.04, 1.0, 1.0))
+    figure.tight_layout(rect=(0.0, 0.04 / bands, 1.0, 1.0))
     figure.savefig(path, dpi=120)
     plt.close(figure)
+
+
+def _draw_scenario(axes: Sequence[Axes], scenario: Scenario, results: Sequence[Result]) -> None:
+    """Draw a scenario into its column."""
+    axes[0].set_title(f'Scenario {scenario.number}: {scenario.title}', fontsize=10)
+    for result in results:
+        if result.scenario != scenario:
+            continue
+        colour, line = STYLES[result.strategy]
+        times, positions, efforts = with_gaps(*result.recording)
+        curves = (positions[:, 0], positions[:, 1], efforts)
+        for axis, values in zip(axes, curves, strict=True):
+            axis.plot(times, values, line, color=colour, label=result.strategy)
+    for axis in axes:
+        axis.axvline(DURATION, color='black', linewidth=0.8)
+        axis.grid(alpha=0.3)
+    axes[-1].tick_params(labelbottom=True)
+    axes[-1].set_xlabel('time [s]')
+    axes[-1].set_xlim(0.0, DURATION + SHOWN_AFTER)
+    axes[-1].xaxis.set_major_locator(MultipleLocator(TICKS))
+
+
+def _share_range(axes: Sequence[Axes]) -> None:
+    """Give axes of the same quantity the same range."""
+    shown = [axis for axis in axes if axis.lines]
+    low, high = zip(*(axis.get_ylim() for axis in shown), strict=True)
+    for axis in shown:
+        axis.set_ylim(min(low), max(high))

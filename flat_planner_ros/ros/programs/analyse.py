@@ -250,12 +250,12 @@ class _Telling:
         self._print()
         self._begin()
         self.count += 1
-        self._waiting = _as_dict(judgement)
+        self._waiting = report = _as_dict(judgement)
         if self._options.json is not None:
-            self._reports.append(self._waiting)
+            self._reports.append(report)
         for figures in self._figures:
             figures.take(judgement)
-        start = self._waiting['values']['start_time']
+        start = report['values']['start_time']
         self._recorded = {key: its for key, its in self._recorded.items() if key >= start}
         if start in self._recorded:
             self._print()
@@ -304,6 +304,11 @@ class _Telling:
             shown = f'{value:.9f}' if key in ('start_time', 'end_time') else _shown(value)
             unit = UNITS.get(key.partition('.')[0], '')
             print(f'  {key:<{width}}  {shown} {unit}'.rstrip())
+        # Imported here: the extra `record` may be missing.
+        from flat_planner_ros.ros.recording.sent_efforts import sentences
+
+        for text in sentences(report['sent']):
+            print(f'  {text}')
         recorded = self._recorded.get(report['values']['start_time'])
         if recorded is not None:
             print(f'  {_compared(report["values"], recorded)}')
@@ -368,6 +373,8 @@ def _draw(judgement: 'Judgement', path: Path) -> None:
         judgement.times,
         judgement.positions,
         judgement.efforts,
+        judgement.tracked,
+        judgement.pushes,
         path,
     )
 
@@ -382,10 +389,14 @@ def _animate(judgement: 'Judgement', path: Path) -> None:
 def _as_dict(judgement: 'Judgement') -> dict[str, Any]:
     """Return a report as JSON has it, with the keys of the monitor's report."""
     status = diagnostics.report_status(judgement.report)
+    # Imported here: the extra `record` may be missing.
+    from flat_planner_ros.ros.recording.sent_efforts import told
+
     return {
         'level': judgement.report.level.value,
         'message': judgement.report.message,
         'values': {pair.key: _value(pair.value) for pair in status.values},
+        'sent': told(judgement.motion, judgement.tracked, judgement.pushes),
     }
 
 

@@ -20,8 +20,8 @@ from threading import Event
 from time import monotonic
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from flat_planner_ros.core.arm import Drive, FloatArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flat_planner_ros.core.arm import Drive
 from flat_planner_ros.core.monitor import PlannedMotion
 from flat_planner_ros.figures.paper_example import (
     DURATION,
@@ -33,8 +33,15 @@ from flat_planner_ros.figures.paper_example import (
 )
 from flat_planner_ros.ros.nodes.node_runner import new_executor
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
+from flat_planner_ros.ros.programs.played_motion import (
+    ExperimentFailed,
+    is_played,
+    of_joint_1,
+    recording,
+    TooBusy,
+)
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
-from flat_planner_ros.ros.wire.joint_states import JointStateReader
+from flat_planner_ros.ros.wire.verdict_text import values_of
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
@@ -43,7 +50,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from scipy.integrate import trapezoid
-from scipy.interpolate import CubicSpline
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -59,15 +65,6 @@ PATIENCE = 60.0
 
 REPORT_PATIENCE = 20.0
 """Real time that a motion and its report may take [s]."""
-
-ATTEMPTS = 4
-"""Runs of one case until the plant played the command from its first point on."""
-
-PLAYED_TOLERANCE = 1e-3
-"""Largest difference of applied and planned effort in a valid run, relative to the peak [-]."""
-
-FOLLOWED_TOLERANCE = 1e-4
-"""The same for the angle of a joint with a servo; angles begin far more gently than efforts."""
 
 NO_SWING = 1e-6
 """Half a swing that counts as the amplitude where there is no oscillation to fit [rad]."""
@@ -89,11 +86,7 @@ RECORDING = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 """Quality of service for the joint states of one run: none is lost while this process is busy."""
 
 OURS = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
-"""The nodes that take part."""
-
-
-class ExperimentFailed(Exception):
-    """The experiment cannot go on; the message says why."""
+"""The nodes that take part in each run."""
 
 
 class Interrupted(Exception):
@@ -119,7 +112,20 @@ class Experimenter(Node):
     drive
         With which the nodes were started.
 
+    Attributes
+    ----------
+    nodes
+        Names of those that take part.
+    commanded
+        Name of the one that hears the planner's command.
+    attempts
+        Runs of one case until it is carried out as planned.
+
     """
+
+    nodes: tuple[str, ...] = OURS
+    commanded: str = interfaces.PLANT
+    attempts: int = 4
 
     def __init__(
         self,
@@ -158,9 +164,14 @@ class Experimenter(Node):
         self._reset = self.create_client(Trigger, interfaces.topic_of(plant, interfaces.RESET))
         self._adopt = self.create_client(Trigger, interfaces.topic_of(planner, interfaces.ADOPT))
 
+    def destroy_node(self) -> None:
+        """Let go of the executor, too, which keeps what it spins."""
+        self._spinner.shutdown()
+        super().destroy_node()
+
     def wait_for_nodes(self) -> None:
-        """Wait until all three nodes answer and hear each other."""
-        planner, plant, monitor = OURS
+        """Wait until all nodes answer and hear each other."""
+        planner, _, monitor = OURS
         command = interfaces.topic_of(planner, interfaces.COMMAND)
         plan = interfaces.topic_of(planner, interfaces.PLAN)
 
@@ -173,18 +184,19 @@ class Experimenter(Node):
                 ),
             ]
             names = [info.node_name for info in listeners]
-            return {plant, monitor, planner} <= set(names) and names.count(monitor) > 1
+            return {self.commanded, monitor, planner} <= set(names) and names.count(monitor) > 1
 
         self._await(
             lambda: (
                 all(client.service_is_ready() for client in self._setters.values())
+                and all(self.get_node_names().count(name) == 1 for name in self.nodes)
                 and self._reset.service_is_ready()
                 and self._adopt.service_is_ready()
                 and self._goals.get_subscription_count() > 0
                 and bool(self._states)
                 and are_listening()
             ),
-            'the three nodes do not find each other',
+            'the nodes do not find each other',
         )
 
     def run(self, scenario: Scenario, method: Method) -> Result:
@@ -200,7 +212,7 @@ class Experimenter(Node):
 
         """
         self._configure(scenario, method)
-        if company := [name for name in OURS if self.get_node_names().count(name) > 1]:
+        if company := [name for name in self.nodes if self.get_node_names().count(name) > 1]:
             raise ExperimentFailed(_complaint(company))
         if method.learns:
             self._played(scenario, method)
@@ -209,13 +221,13 @@ class Experimenter(Node):
 
     def _played(self, scenario: Scenario, method: Method) -> Result:
         """Return a motion that was played as planned."""
-        for _ in range(ATTEMPTS):
+        for _ in range(self.attempts):
             try:
                 return self._attempt(scenario, method)
             except NotPlayed as reason:
                 self.get_logger().warning(f'{reason}; once more')
                 self._lead *= 2.0
-        raise ExperimentFailed(f'not played as planned {ATTEMPTS} times: the machine is too busy')
+        raise TooBusy(f'not played as planned {self.attempts} times: the machine is too busy')
 
     def _learn(self) -> None:
         """Have the planner adopt the monitor's estimate as soon as it has heard of it."""
@@ -241,6 +253,7 @@ class Experimenter(Node):
         mismatch = {
             'mismatch.stiffness_scale': scenario.stiffness_scale,
             'mismatch.damping_scale': scenario.damping_scale,
+            'mismatch.inertia_scale': scenario.inertia_scale,
         }
         self._set(plant, mismatch)
 
@@ -256,26 +269,39 @@ class Experimenter(Node):
 
     def _attempt(self, scenario: Scenario, method: Method) -> Result:
         """Carry out one motion from rest."""
-        self._call(self._reset, Trigger.Request())
+        self._reset_arm()
         for heard in (self._states, self._verdicts, self._plans, self._reports):
             heard.clear()
         self._await(lambda: bool(self._states), 'no joint states')
         start = self._accepted_start()
         if not self._spin_until(lambda: bool(self._plans and self._reports), REPORT_PATIENCE):
             raise NotPlayed(f'no report of the motion at {start:.3f} s')
-        values = {pair.key: pair.value for pair in self._reports[0].status[0].values}
+        played = recording(self._states, start)
+        motion = conversions.planned_motion_from_trajectory(self._plans[0])
+        self._check(played, motion)
+        amplitude = self._amplitude(self._reports[0].status[0], played)
+        planned = of_joint_1(motion.efforts)
+        rms = float(np.sqrt(trapezoid(planned**2, motion.times) / DURATION))
+        peak = float(np.abs(played.efforts).max() / np.abs(planned).max())
+        return Result(scenario, method.name, rms, amplitude, played, self._drive, peak)
+
+    def _reset_arm(self) -> None:
+        """Bring the arm back to where it starts."""
+        self._call(self._reset, Trigger.Request())
+
+    def _amplitude(self, status: DiagnosticStatus, played: Recording) -> float:
+        """Return the amplitude at the end of the motion, as the monitor reports it [rad]."""
+        values = values_of(status)
         # A swing that is too small to be told from rounding has no amplitude of its own.
         swing = 0.5 * float(values.get('peak_to_peak', 'inf'))
         if 'amplitude' not in values and not swing < NO_SWING:
-            raise NotPlayed(f'no amplitude: {self._reports[0].status[0].message}')
-        recording = _recording(self._states, start)
-        motion = conversions.planned_motion_from_trajectory(self._plans[0])
-        if not _is_played(recording, motion, self._drive):
+            raise NotPlayed(f'no amplitude: {status.message}')
+        return float(values.get('amplitude', swing))
+
+    def _check(self, played: Recording, motion: PlannedMotion) -> None:
+        """Refuse a run that a busy machine has spoilt."""
+        if not is_played(played, motion, self._drive):
             raise NotPlayed('the command reached the plant after its start')
-        planned = _of_joint_1(motion.efforts)
-        rms = float(np.sqrt(trapezoid(planned**2, motion.times) / DURATION))
-        amplitude = float(values.get('amplitude', swing))
-        return Result(scenario, method.name, rms, amplitude, recording, self._drive)
 
     def _accepted_start(self) -> float:
         """Send the goal until the planner has seen the reset; return the motion's start [s]."""
@@ -286,7 +312,7 @@ class Experimenter(Node):
             self._goals.publish(_goal(start))
             self._await(lambda: self._verdict() is not None, 'no verdict on the goal')
             verdict = self._verdict()
-            values = {pair.key: pair.value for pair in verdict.values}
+            values = values_of(verdict)
             if values['state'] == 'ACCEPTED':
                 return start
             if values['error_name'] not in PASSING or monotonic() > deadline:
@@ -318,7 +344,7 @@ class Experimenter(Node):
             if self._interrupted.is_set():
                 raise Interrupted
             if any(process.poll() is not None for process in self._processes):
-                raise ExperimentFailed('one of the three nodes has ended')
+                raise ExperimentFailed('one of the nodes has ended')
             if monotonic() > deadline:
                 return False
             self._spinner.spin_once(timeout_sec=0.1)
@@ -344,7 +370,7 @@ def refuse_company(interrupted: Event) -> None:
             if interrupted.is_set():
                 raise Interrupted
             rclpy.spin_once(node, timeout_sec=0.1)
-            present = sorted(set(OURS) & set(node.get_node_names()))
+            present = sorted({*OURS, interfaces.TRACKER} & set(node.get_node_names()))
             if present:
                 raise ExperimentFailed(_complaint(present))
     finally:
@@ -367,37 +393,3 @@ def _goal(start: float) -> JointTrajectory:
     goal = JointTrajectory(joint_names=[EXAMPLE_ARM['joints'][0]], points=[point])
     goal.header.stamp = stamps.time_msg(start)
     return goal
-
-
-def _recording(states: Sequence[JointState], start: float) -> Recording:
-    """Return the joint states of one run on the time axis of its motion."""
-    reader = JointStateReader(EXAMPLE_ARM['joints'])
-    samples = [sample for state in states for sample in reader.read(state, lambda: 0.0)]
-    return Recording(
-        times=np.array([sample.time for sample in samples]) - start,
-        positions=np.array([sample.positions for sample in samples]),
-        efforts=np.array([_of_joint_1(sample.efforts) for sample in samples]),
-    )
-
-
-def _is_played(recording: Recording, motion: PlannedMotion, drive: Drive) -> bool:
-    """Return whether joint 1 was given what is planned, from the first point on."""
-    # Compared where there are joint states: a busy machine loses some of them.
-    moving = (recording.times >= 0.0) & (recording.times <= DURATION)
-    times = recording.times[moving]
-    if drive is Drive.POSITION:
-        # What a servo needs depends on the true arm; where it has to be does not.
-        wanted = CubicSpline(motion.times, motion.positions[:, 0])(times)
-        given, tolerance = recording.positions[moving, 0], FOLLOWED_TOLERANCE
-    else:
-        wanted = np.interp(times, motion.times, _of_joint_1(motion.efforts))
-        given, tolerance = recording.efforts[moving], PLAYED_TOLERANCE
-    peak = np.abs(wanted).max(initial=0.0)
-    return bool(peak > 0.0 and (np.abs(given - wanted) <= tolerance * peak).all())
-
-
-def _of_joint_1(efforts: FloatArray | None) -> FloatArray:
-    """Return the effort of joint 1, of one sample or of all points of a plan."""
-    if efforts is None:
-        raise ExperimentFailed('there are no efforts to compare')
-    return efforts[..., 0]

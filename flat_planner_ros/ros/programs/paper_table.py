@@ -12,23 +12,28 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The paper's experiment on the three real nodes: table, figures and numbers."""
+"""The paper's experiment on the real nodes: table, figures and numbers."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 import csv
-from functools import partial
+from itertools import groupby
 import os
 from pathlib import Path
-import signal
-import subprocess
 import sys
 from threading import Event
 
-from flat_planner_ros.child_process import end_with_parent
 from flat_planner_ros.core.arm import Drive
-from flat_planner_ros.figures.paper_example import BEYOND, CASES, Method, Result, Scenario
+from flat_planner_ros.figures.paper_example import (
+    BEYOND,
+    CASES,
+    EXACT,
+    Method,
+    Result,
+    Scenario,
+    TRACKED,
+)
 from flat_planner_ros.programs import INTERRUPTED
 from flat_planner_ros.ros.dds_profile import profile_environment
 from flat_planner_ros.ros.nodes.node_runner import signals_caught
@@ -46,11 +51,17 @@ from flat_planner_ros.ros.programs.outputs import (
 )
 from flat_planner_ros.ros.programs.paper_experiment import (
     Experimenter,
-    ExperimentFailed,
     Interrupted,
     refuse_company,
 )
+from flat_planner_ros.ros.programs.paper_nodes import (
+    node_processes,
+    planned_nodes,
+    tracked_nodes,
+)
+from flat_planner_ros.ros.programs.played_motion import ExperimentFailed, TooBusy
 from flat_planner_ros.ros.programs.progress import progress
+from flat_planner_ros.ros.programs.tracked_experiment import TrackedExperimenter
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -58,14 +69,11 @@ from rclpy.utilities import remove_ros_args
 SPEED = 5.0
 """Simulated seconds per second unless in real time; a busy machine is slower by itself."""
 
-WINDOW = 3.0
-"""Time after the motion from which the monitor takes the amplitude [s]."""
+TRACKED_SPEED = 0.5
+"""The same with the tracker, whose loop has so much more time for a sample of its own."""
 
-SILENCE = 5.0
-"""Real time for which a busy machine may be silent [s]."""
-
-TERMINATION = 10.0
-"""Time that a node is given to end by itself [s]: twice what it takes to end for certain."""
+SLOWER, SLOWEST = 0.4, 0.1
+"""What a machine that does not keep up is given: speeds of that ratio, down to about the least."""
 
 SHOWN_AS_DECIMAL = 1e-4
 """Amplitude from which the table shows decimals rather than an exponent [rad]."""
@@ -77,6 +85,9 @@ COLUMNS = (
     'amplitude',
     'paper_rms_effort',
     'paper_amplitude',
+    'miss',
+    'settling_time',
+    'peak_ratio',
 )
 
 HEADER = """
@@ -100,7 +111,21 @@ Beyond the paper (docs/derivation.md, sections 3, 8.1 and I); scenario 4 is scen
 - exact: min_control_effort on the exact flat map. Damping leaves nothing, a mismatch what it must.
 - insensitive: exact too, and small over all stiffness and damping within 10 %, for more effort.
 - self-tuned: the second of two exact motions, planned with the stiffness and damping that the
-  monitor has read from the oscillation after the first."""
+  monitor has read from the oscillation after the first.
+- tracked: exact, with the tracker around it at 500 Hz (encoders of 14 bits); amplitude: largest
+  swing after T."""
+
+
+TRACKED_REMARKS = """
+With the tracker (docs/closed_loop.md), also on arms that differ further: k and c +25 % (5) and
+-25 % (6), all inertias +10 % (7) and -10 % (8), friction 2e-4 N m s/rad and 5e-4 N m (9). Distance
+of joint 1 from its goal at T; time after T until swing and distance stay below 5 mrad, - where
+that is not seen; peak of the effort, relative to the planned one:"""
+
+TRACKED_HEADER = """
+          |                       |  distance at T | settled | peak
+ scenario | strategy              |      [rad]     |   [s]   | [-]
+----------+-----------------------+----------------+---------+------"""
 
 
 SERVO_REMARKS = """
@@ -130,7 +155,10 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'paper_table: no directory {Path(path).parent} for {path}', file=sys.stderr)
             return 1
     speed = 1.0 if options.real_time else SPEED
-    cases = BEYOND if options.beyond else CASES
+    cases = _cases(options)
+    if not cases:
+        print('paper_table: no row is of these scenarios', file=sys.stderr)
+        return 1
     # At once, for whoever waits at the end of a pipe.
     about = f'{len(cases)} motions, {speed:g} times as fast as in real time'
     print(about, file=summary, flush=True)
@@ -145,6 +173,8 @@ def main(args: Sequence[str] | None = None) -> int:
         print(remarks, file=summary, flush=True)
         if options.beyond:
             print(BEYOND_REMARKS, file=summary, flush=True)
+        if feedback := _feedback_rows(results):
+            print(TRACKED_REMARKS, TRACKED_HEADER, *feedback, file=summary, sep='\n', flush=True)
         if options.csv is not None:
             _write_csv(results, options.csv)
         if options.plot is not None:
@@ -170,13 +200,21 @@ def _options(arguments: Sequence[str]) -> Namespace:
         '--beyond',
         action='store_true',
         help='add a plant that is 10 %% softer, and what the paper does not have: exact and '
-        'insensitive motions, and a second motion after self-tuning',
+        'insensitive motions, a second motion after self-tuning, and what the tracker leaves',
+    )
+    parser.add_argument(
+        '--scenario',
+        nargs='+',
+        type=int,
+        metavar='N',
+        choices=sorted({scenario.number for scenario, _ in BEYOND}),
+        help='only these: the paper has 1 to 3; 4 to 9 with --beyond',
     )
     parser.add_argument(
         '--drive',
         choices=[drive.value for drive in Drive],
         default=Drive.EFFORT.value,
-        help='what joint 1 is given in all three nodes: the paper gives an effort',
+        help='what joint 1 is given in all nodes: the paper gives an effort',
     )
     parser.add_argument(
         '--plot', metavar='FILE', type=figure_name, help='figures, .png, .pdf or .svg, or -'
@@ -190,71 +228,65 @@ def _options(arguments: Sequence[str]) -> Namespace:
     return parsed(parser, arguments, ['csv', 'plot'])
 
 
+def _cases(options: Namespace) -> list[tuple[Scenario, Method]]:
+    """Return what is to be carried out."""
+    return [
+        (scenario, method)
+        for scenario, method in (BEYOND if options.beyond else CASES)
+        if (not options.scenario or scenario.number in options.scenario)
+        # The tracker sends efforts, which a servo does not take.
+        and not (method.is_tracked and options.drive == Drive.POSITION.value)
+    ]
+
+
 def _results(
     speed: float, cases: Sequence[tuple[Scenario, Method]], interrupted: Event, drive: Drive
 ) -> list[Result]:
     """Return the rows, printed as they come."""
-    results = []
-    with _node_processes(speed, drive) as processes:
-        experimenter = Experimenter(speed, processes, interrupted, drive)
-        try:
-            print('starting the three nodes ...', flush=True)
-            experimenter.wait_for_nodes()
-            print(HEADER, flush=True)
-            with progress(len(cases), 'paper_table') as advance:
-                for scenario, method in cases:
-                    results.append(experimenter.run(scenario, method))
-                    advance(1)
-                    print(_row(results[-1]), flush=True)
-        finally:
-            experimenter.destroy_node()
+    results: list[Result] = []
+    print('starting the nodes ...', flush=True)
+    with progress(len(cases), 'paper_table') as advance:
+        for (is_tracked, *_), group in groupby(cases, _setup):
+            rows = list(group)
+            pace = min(speed, TRACKED_SPEED) if is_tracked and speed > 1.0 else speed
+            while rows:
+                try:
+                    for result in _carried_out(rows, pace, interrupted, drive):
+                        if not results:
+                            print(HEADER, flush=True)
+                        print(_row(result), flush=True)
+                        results.append(result)
+                        del rows[0]
+                        advance(1)
+                except TooBusy as reason:
+                    if speed == 1.0 or pace < SLOWEST:
+                        raise
+                    pace *= SLOWER
+                    print(f'{reason}; {pace:g} times as fast', file=sys.stderr)
     return results
 
 
-@contextmanager
-def _node_processes(speed: float, drive: Drive) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Run planner, plant and monitor, the plant owning the time."""
-    parameters = {
-        'planner': {
-            'use_sim_time': 'true',
-            'reference_rate': '10.0',
-            # Given, and checked against the measured one, which may be from before a reset.
-            'start.source': 'parameter',
-            'start.position': '[0.0, 0.0]',
-            'start.joint_state_timeout': str(SILENCE * speed),
-        },
-        'plant': {'publish_clock': 'true', 'real_time_factor': str(speed)},
-        'monitor': {
-            'use_sim_time': 'true',
-            'window': str(WINDOW),
-            'timeout': str(SILENCE * speed),
-        },
-    }
-    processes = []
-    try:
-        for node, values in parameters.items():
-            module = f'flat_planner_ros.ros.nodes.{node}_node'
-            command = [sys.executable, '-m', module, '--ros-args', '--log-level', 'fatal']
-            for name, value in {'drive': drive.value, **values}.items():
-                command += ['-p', f'{name}:={value}']
-            # Its own session: Ctrl-C reaches this process alone, which ends the nodes in order.
-            processes.append(
-                subprocess.Popen(
-                    command,
-                    start_new_session=True,
-                    preexec_fn=partial(end_with_parent, signal.SIGTERM),
-                )
-            )
-        yield processes
-    finally:
-        for process in processes:
-            process.terminate()
-        for process in processes:
-            try:
-                process.wait(TERMINATION)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+def _carried_out(
+    cases: Sequence[tuple[Scenario, Method]], speed: float, interrupted: Event, drive: Drive
+) -> Iterator[Result]:
+    """Yield the results of cases that share their nodes."""
+    scenario, method = cases[0]
+    is_tracked = method.is_tracked
+    parameters = tracked_nodes(speed, scenario) if is_tracked else planned_nodes(speed, drive)
+    kind = TrackedExperimenter if is_tracked else Experimenter
+    with node_processes(parameters) as processes:
+        experimenter = kind(speed, processes, interrupted, drive)
+        try:
+            experimenter.wait_for_nodes()
+            yield from (experimenter.run(*case) for case in tuple(cases))
+        finally:
+            experimenter.destroy_node()
+
+
+def _setup(case: tuple[Scenario, Method]) -> tuple[bool, float, float]:
+    """Return what is fixed at the start of the nodes: rows that share it run on the same."""
+    scenario, method = case
+    return method.is_tracked, scenario.viscous_friction, scenario.coulomb_friction
 
 
 def _row(result: Result) -> str:
@@ -271,16 +303,33 @@ def _row(result: Result) -> str:
     )
 
 
+def _feedback_rows(results: Sequence[Result]) -> list[str]:
+    """Return what feedback leaves, beside the same motions without it."""
+    tracked = {result.scenario.number for result in results if result.strategy == TRACKED.name}
+    return [
+        f' {result.scenario.number:^8} | {result.strategy:<21} | {result.miss:^14.4f} | '
+        f'{"-" if result.settling_time is None else f"{result.settling_time:.2f}":^7} | '
+        f'{result.peak_ratio:.2f}'
+        for result in results
+        if result.strategy in (EXACT.name, TRACKED.name) and result.scenario.number in tracked
+    ]
+
+
 def _write_csv(results: Sequence[Result], name: str) -> None:
     """Write the numbers."""
     with open_text(name) as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for result in results:
-            printed = result.printed or ()
-            numbers = map(repr, (result.rms_effort, result.amplitude, *printed))
-            row = [result.scenario.number, result.strategy, *numbers]
-            writer.writerow([*row, *[''] * (len(COLUMNS) - len(row))])
+            printed = result.printed or ('', '')
+            settled = '' if result.settling_time is None else result.settling_time
+            writer.writerow(
+                [
+                    *(result.scenario.number, result.strategy),
+                    *(result.rms_effort, result.amplitude, *printed),
+                    *(result.miss, settled, result.peak_ratio),
+                ]
+            )
     print(f'numbers: {name}', file=sys.stderr)
 
 

@@ -19,6 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import groupby
 import json
+from math import inf
 from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, SampleTable
@@ -32,15 +33,25 @@ from flat_planner_ros.core.monitor import (
 from flat_planner_ros.ros.parameters import monitor as monitor_parameters
 from flat_planner_ros.ros.recording.recent_samples import RecentSamples, table_of
 from flat_planner_ros.ros.recording.recording import Recording
+from flat_planner_ros.ros.recording.sent_efforts import (
+    ArrivalClock,
+    EffortRecord,
+    FLOAT_ARRAY,
+    SentEfforts,
+)
 from flat_planner_ros.ros.recording.storage import Entry
 from flat_planner_ros.ros.wire import conversions, stamps
 from flat_planner_ros.ros.wire.interfaces import (
     DIAGNOSTICS,
+    EFFORT_COMMANDS,
     JOINT_STATES,
     MONITOR,
     PLAN,
     PLANNER,
+    PLANT,
+    PUSH,
     topic_of,
+    TRACKER,
 )
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
@@ -80,6 +91,16 @@ class Sources:
         """Return the namespace of the nodes, without a slash at its end."""
         return self.plan.removesuffix('/' + topic_of(PLANNER, PLAN))
 
+    @property
+    def tracker_efforts(self) -> str:
+        """Return the topic of what a tracker sends."""
+        return f'{self.namespace}/{topic_of(TRACKER, EFFORT_COMMANDS)}'
+
+    @property
+    def pushes(self) -> str:
+        """Return the topic of pushes."""
+        return f'{self.namespace}/{topic_of(PLANT, PUSH)}'
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judgement:
@@ -95,6 +116,8 @@ class Judgement:
         shape (m,).
     positions, efforts
         Measured [rad], [N m], shape (m, n); efforts are NaN where unknown.
+    tracked, pushes
+        Efforts that a tracker has sent, and those of whoever pushed the arm.
 
     """
 
@@ -103,6 +126,8 @@ class Judgement:
     times: FloatArray
     positions: FloatArray
     efforts: FloatArray
+    tracked: SentEfforts
+    pushes: SentEfforts
 
 
 def find_sources(
@@ -187,7 +212,9 @@ def replay(
     own = {sources.plan, sources.joint_states}
     if recording.topics.get(DIAGNOSTICS) == DIAGNOSTIC_ARRAY:
         own.add(DIAGNOSTICS)
-    for entries in stretches(recording.batches({*own, *topics})):
+    sent = {t for t in player.sent if recording.topics.get(t) == FLOAT_ARRAY}
+    batches = player.without_sent(recording.batches({*own, *sent, *topics}))
+    for entries in stretches(batches):
         if entries[0].topic in own:
             yield from player.take(entries)
         else:
@@ -227,10 +254,22 @@ class _Player:
         self._changes = list(settings[1:])
         self._recording = recording
         self._remark = remark
-        self._stamp: float | None = None
+        self._stamp = -inf
         self._reader: JointStateReader | None = None
         self._motions: list[PlannedMotion] = []
         self._samples = RecentSamples()
+        self._clock = ArrivalClock()
+        efforts = (sources.tracker_efforts, sources.pushes)
+        self.sent = {topic: EffortRecord(recording) for topic in efforts}
+
+    def without_sent(self, batches: Iterator[Sequence[Entry]]) -> Iterator[Sequence[Entry]]:
+        """Yield batches without the efforts that are sent, which are kept."""
+        for batch in batches:
+            for topic, record in self.sent.items():
+                record.take([entry for entry in batch if entry.topic == topic])
+            if self._is_between_motions():
+                self._forget_sent(self._stamp - SHOWN_BEFORE * LONGEST)
+            yield [entry for entry in batch if entry.topic not in self.sent]
 
     def take(self, entries: Sequence[Entry]) -> Iterator[Judgement]:
         """Take messages of one topic and one length; those that cannot be used are left out."""
@@ -246,7 +285,7 @@ class _Player:
 
     def end(self) -> Iterator[Judgement]:
         """Judge a motion that is still watched: nothing more will come."""
-        if self._stamp is not None:
+        if self._stamp > -inf:
             silence = SILENCE * self.monitor.settings.timeout
             yield from self._judged(self.monitor.tick(self._stamp + silence))
 
@@ -283,6 +322,7 @@ class _Player:
         while len(samples):
             taken, reports = self.monitor.add_table(samples, heard)
             self._samples.add(samples.rows(slice(taken)))
+            self._clock.hear(heard[:taken], samples.times[:taken])
             self._stamp = float(samples.times[taken - 1])
             yield from self._judged(reports)
             samples, heard = samples.rows(slice(taken, None)), heard[taken:]
@@ -313,6 +353,7 @@ class _Player:
         for sample in self._reader.read(msg, lambda: arrival):
             self._stamp = sample.time
             self._samples.add(table_of(sample))
+            self._clock.hear(np.array([arrival]), np.array([sample.time]))
             yield from self._judged(self.monitor.add(sample))
         self._forget_old()
         for text in self._reader.take_remarks():
@@ -324,12 +365,24 @@ class _Player:
             motion = next(m for m in reversed(self._motions) if m.start == report.start_time)
             yield self._judgement(report, motion)
             # The next motion needs what came since this one began, at most.
-            self._samples.forget(motion.start + (report.clock_offset or 0.0))
+            begin = motion.start + (report.clock_offset or 0.0)
+            self._samples.forget(begin)
+            self._forget_sent(begin)
 
     def _forget_old(self) -> None:
         """Forget samples that no figure will show."""
-        if self._stamp is not None and self.monitor.phase in (Phase.IDLE, Phase.DONE):
+        if self._is_between_motions():
             self._samples.forget(self._stamp - SHOWN_BEFORE * LONGEST)
+
+    def _is_between_motions(self) -> bool:
+        """Return whether there is a time, and nothing is watched."""
+        return self._stamp > -inf and self.monitor.phase in (Phase.IDLE, Phase.DONE)
+
+    def _forget_sent(self, until: float) -> None:
+        """Forget what was sent before a stamp [s]."""
+        for record in self.sent.values():
+            record.forget(until, self._clock)
+        self._clock.forget(until)
 
     def _judgement(self, report: VibrationReport, motion: PlannedMotion) -> Judgement:
         """Return a report with its motion and the samples around it."""
@@ -338,12 +391,18 @@ class _Player:
         last = motion.end + self.monitor.settings.window
         shown = self._samples.between(first + ahead, last + ahead, len(motion.joint_names))
         efforts = np.full_like(shown.positions, np.nan) if shown.efforts is None else shown.efforts
+        tracked, pushes = (
+            record.between(first + ahead, last + ahead, self._clock)
+            for record in self.sent.values()
+        )
         return Judgement(
             report=report,
             motion=motion,
             times=shown.times - ahead,
             positions=shown.positions,
             efforts=efforts,
+            tracked=tracked.earlier(ahead),
+            pushes=pushes.earlier(ahead),
         )
 
 
