@@ -26,8 +26,8 @@ from std_srvs.srv import Trigger
 LETTING_GO = 0.2
 """Simulated time from `~/release` until nothing moves the arm any more [s]."""
 
-ANSWERED = 0.7
-"""Least part of the joint states that the tracker answers with another effort in a valid run."""
+LONGEST = 0.012
+"""Longest time for which an effort may stay the same in a valid run [s]: six samples."""
 
 
 class TrackedExperimenter(Experimenter):
@@ -64,8 +64,9 @@ class TrackedExperimenter(Experimenter):
         if played.times.size < 2 or played.times[-1] < DURATION + SEEN:
             raise NotPlayed('joint states were lost')
         moving = (played.times >= 0.0) & (played.times <= DURATION)
-        changes = np.count_nonzero(np.diff(played.efforts[moving]))
-        if changes < ANSWERED * np.count_nonzero(moving):
+        is_new = np.append(True, np.diff(played.efforts[moving]) != 0.0)
+        renewed = np.append(played.times[moving][is_new], DURATION)
+        if np.diff(renewed).max() > LONGEST:
             raise NotPlayed('the tracker was late')
 
     def _amplitude(self, status: Any, played: Recording) -> float:

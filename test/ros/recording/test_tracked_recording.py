@@ -74,7 +74,7 @@ def test_a_tracked_motion_is_adopted_from_its_efforts_and_judged_again(graph, tm
     assert 'stiffness_estimate' not in again['values']
     sent = again['sent']
     assert 0.0 < sent['feedback_rms.joint1'] < sent['feedback_peak.joint1']
-    assert sent['feedback_peak.joint1'] < 0.5 * sent['planned_peak.joint1']
+    assert sent['feedback_rms.joint1'] < 0.5 * sent['planned_peak.joint1']
 
 
 def test_what_feedback_added_and_who_pushed_is_told_by_the_clock_of_the_joint_states(
