@@ -14,7 +14,6 @@
 
 """A tracked motion is reported, recorded and adopted as what it is."""
 
-from functools import partial
 import json
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -32,7 +31,6 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 pytest.importorskip('mcap')
 
 from flat_planner_ros.ros.programs import analyse  # noqa: E402, I100  It needs it.
-from flat_planner_ros.ros.recording.recorder_node import RecorderNode  # noqa: E402
 from flat_planner_ros.ros.recording.recording import Recording, RecordingWriter  # noqa: E402
 
 PUSH = '/flat_plant/push'
@@ -55,7 +53,9 @@ def test_a_tracked_motion_is_adopted_from_its_efforts_and_judged_again(graph, tm
     arm.hear_monitor()
     adopted = graph.collect(DiagnosticArray, '/flat_planner/status', interfaces.VERDICTS)
     path = tmp_path / 'tracked.mcap'
-    recorder = graph.create(partial(RecorderNode, path))
+    # In a process of its own, which is in time: what is sent has no stamps.
+    recorder = graph.start('record', '--output', str(path))
+    graph.expect(lambda: path.exists() and path.stat().st_size, 'the recorder')
     graph.expect(lambda: '/diagnostics' in Recording(path).topics, 'the recorder on diagnostics')
     arm.move(1.5)
     graph.expect(lambda: arm.reports, 'a report')
@@ -67,7 +67,7 @@ def test_a_tracked_motion_is_adopted_from_its_efforts_and_judged_again(graph, tm
     graph.expect(lambda: any(values(m)['state'] == 'ADOPTED' for m in adopted), 'an adoption')
     graph.publish(PUSH, Float64MultiArray(data=[1e-3, 0.0]), readers=2)
     graph.expect(lambda: {EFFORTS, PUSH} <= set(Recording(path).topics), 'efforts and pushes')
-    graph.remove(recorder)
+    assert recorder.stop() == 0
     assert analyse.main(['analyse', str(path), '--json', '-']) == 0
     (again,) = json.loads(capsys.readouterr().out)['reports']
     assert again['values']['tracked'] is True
