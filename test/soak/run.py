@@ -13,10 +13,11 @@
 # limitations under the License.
 
 """
-Soak test: random motions on two arms for a long time, with faults; "make soak".
+Soak test: random motions on three arms for a long time, with faults; "make soak".
 
 The 2-DOF arm runs faster than real time and keeps its processes, so that their memory can be
-followed; the 4-DOF arm runs in real time and has its nodes killed. Exit code 1 if anything failed.
+followed; the 4-DOF arm runs in real time and has its nodes killed. The tracked one runs slower and
+has its tracker killed, stopped, doubled, and its model wrong. Exit code 1 if anything failed.
 """
 
 from __future__ import annotations
@@ -33,10 +34,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from ros.conftest import free_domain, Graph  # noqa: E402  From the directory of tests.
 from soak.rig import Soak  # noqa: E402
+from soak.tracked import TrackedSoak  # noqa: E402
 
 RIGS = {
-    '2-DOF, 2 x real time': ('arm_2dof.yaml', 2.0),
-    '4-DOF, real time': ('arm_4dof.yaml', None),
+    '2-DOF, 2 x real time': lambda graph, seed: Soak(graph, 'arm_2dof.yaml', 2.0, seed),
+    '4-DOF, real time': lambda graph, seed: Soak(graph, 'arm_4dof.yaml', None, seed),
+    '2-DOF, tracked': TrackedSoak,
 }
 
 WARM_UP = 0.3
@@ -61,11 +64,10 @@ def growth(samples: list[tuple[float, float]], seconds: float) -> float | None:
 
 def run_rig(name: str, minutes: float, seed: int) -> None:
     """Run one arm and print what happened as JSON."""
-    file, speed = RIGS[name]
     with free_domain() as domain:
         graph = Graph(domain)
         try:
-            rig = Soak(graph, file, speed, seed)
+            rig = RIGS[name](graph, seed)
             rig.run(60.0 * minutes)
             failures = list(rig.failures)
             seconds = rig.counts['seconds']

@@ -1,0 +1,246 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The soak test's tracked arm: wrong models, pushes, trackers killed, stopped and doubled."""
+
+from __future__ import annotations
+
+from collections import Counter
+import os
+from pathlib import Path
+import signal
+from time import monotonic
+
+import numpy as np
+from ros.conftest import Graph
+from ros.tracked_arm import ELDER, Tracked
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+
+LIMIT = 0.05
+"""Largest effort that the tracker may send [N m]."""
+
+BAND, SETTLED = 5e-3, 1.0
+"""Swing and error [rad] below which an arm must be so long after its motion [s]."""
+
+LET_GO = 0.3
+"""Time in which the plant's effort must be zero after the last one was sent [s]: input_timeout."""
+
+FROZEN = 0.5
+"""Time for which a tracker is stopped [s]; its timeout is shorter."""
+
+MEMORY_PERIOD = 2.0
+"""Real time between two looks at the memory of the nodes [s]."""
+
+KINDS = (
+    *('plain', 'wrong model', 'push', 'release', 'doubled'),
+    *('SIGINT', 'SIGTERM', 'SIGKILL', 'SIGSTOP'),
+)
+"""What may happen to a motion."""
+
+
+class TrackedSoak(Tracked):
+    """
+    A tracked arm and what is done to it; attributes as of `Soak`.
+
+    Parameters
+    ----------
+    graph
+        A graph of its own.
+    seed
+        Of all that is random.
+
+    """
+
+    def __init__(self, graph: Graph, seed: int) -> None:
+        """Start the nodes."""
+        self.random = np.random.default_rng(seed)
+        self.counts: Counter[str] = Counter()
+        self.failures: list[str] = []
+        self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
+        self.offsets: list[tuple[float, float]] = []
+        self.processes = {}
+        self._born, self._looked = monotonic(), 0.0
+        super().__init__(graph)
+        self.processes['plant_node'] = self.plant
+        self.memory['plant_node', self.plant.pid] = []
+
+    def start_tracker(self, **given) -> None:
+        """Start a tracker with a limit."""
+        super().start_tracker(**{'limits.effort': f'[{LIMIT}]', **given})
+        self.processes['tracker_node'] = self.tracker
+        self.memory['tracker_node', self.tracker.pid] = []
+
+    def run(self, seconds: float) -> None:
+        """Let episodes follow each other for a time [s]."""
+        until = monotonic() + seconds
+        while monotonic() < until:
+            kind = str(self.random.choice(KINDS))
+            try:
+                self._episode(kind)
+            except AssertionError as error:
+                self.failures.append(f'{kind}: {error}')
+                if len(self.failures) > 10:
+                    return
+        self.counts['seconds'] = round(monotonic() - self._born)
+
+    def _episode(self, kind: str) -> None:
+        """Move once, with whatever happens, and once more, as if nothing had."""
+        self.counts['episodes'] += 1
+        self._begin(kind)
+        self._move()
+        if kind in ('plain', 'wrong model', 'push'):
+            self._see_it_settle(kind)
+            return
+        self.wait_until(self.begin + float(self.random.uniform(0.2, 0.9)))
+        {
+            'release': self._release,
+            'doubled': self._double,
+            'SIGINT': lambda: self._end(signal.SIGINT),
+            'SIGTERM': lambda: self._end(signal.SIGTERM),
+            'SIGKILL': lambda: self._end(signal.SIGKILL),
+            'SIGSTOP': self._freeze,
+        }[kind]()
+        self._check_efforts()
+        self._begin('plain')
+        self._move()
+        self._see_it_settle('plain')
+
+    def _begin(self, kind: str) -> None:
+        """Bring the arm back to rest, with the model that the episode wants."""
+        self.graph.call(Trigger, '/flat_tracker/release')
+        self.await_silence()
+        share = self.random.uniform(-1.0, 1.0, 3) if kind == 'wrong model' else np.zeros(3)
+        results = self.graph.set_parameters(
+            'flat_plant',
+            **{
+                'mismatch.stiffness_scale': 1.0 + 0.25 * float(share[0]),
+                'mismatch.damping_scale': 1.0 + 0.25 * float(share[1]),
+                'mismatch.inertia_scale': 1.0 + 0.1 * float(share[2]),
+            },
+        )
+        assert all(result.successful for result in results), results
+        self.graph.call(Trigger, '/flat_plant/reset')
+        self.pass_time(0.5)
+        del self.sent[:], self.status[:], self.states[:-1], self.graph.log[:]
+
+    def _move(self) -> None:
+        """Move to a random pose."""
+        self.goal = float(self.random.uniform(0.3, 3.0) * self.random.choice([-1.0, 1.0]))
+        self.move(self.goal)
+        self.counts['motions'] += 1
+
+    def _see_it_settle(self, kind: str) -> None:
+        """Look at what is left of the motion, and of a push after it."""
+        since = self.end
+        if kind == 'push':
+            self.wait_until(self.end + 0.1)
+            push = float(self.random.uniform(-0.02, 0.02))
+            self.graph.publish('/flat_plant/push', Float64MultiArray(data=[push, 0.0]))
+            since = self.end + 0.3
+            self.counts['pushes'] += 1
+        self.wait_until(since + SETTLED + 0.3)
+        self._check_efforts()
+        if self._is_late():
+            self.counts['motions late, said by the tracker'] += 1
+            return
+        self.counts['ends checked'] += 1
+        worst = self.errors(since + SETTLED, self.goal).max()
+        assert worst < BAND, f'{worst:.4f} rad off, {SETTLED:g} s after the end'
+
+    def _release(self) -> None:
+        """Let the arm go in its motion."""
+        self.graph.call(Trigger, '/flat_tracker/release')
+        self._await_nothing()
+
+    def _end(self, number: int) -> None:
+        """End the tracker in its motion, and start another one: nothing moves by itself."""
+        del self.processes['tracker_node']
+        if number == signal.SIGKILL:
+            self.tracker.kill()
+        else:
+            code = self.tracker.stop(number)
+            assert code == 0, f'exit code {code}: {self.tracker.stderr[-2000:]}'
+        self._await_nothing()
+        self.graph.call(Trigger, '/flat_plant/reset')
+        self.start_tracker()
+        count = len(self.sent)
+        self.pass_time(0.5)
+        assert len(self.sent) == count, 'a restarted tracker sends efforts'
+        moved = np.ptp([state.position[0] for state in self.states[-100:]])
+        assert moved < 1e-3, f'the arm has moved by {moved:.4f} rad after the restart'
+
+    def _freeze(self) -> None:
+        """Stop the tracker for a while: it gives up, says so once, and idles."""
+        os.kill(self.tracker.pid, signal.SIGSTOP)
+        try:
+            self.pass_time(FROZEN)
+            self._assert_no_effort()
+        finally:
+            os.kill(self.tracker.pid, signal.SIGCONT)
+        self.graph.expect(lambda: self.graph.logged('given up'), 'an error')
+        self._await_nothing()
+        said = self.graph.logged('given up')
+        assert len(said) == 1, said
+
+    def _double(self) -> None:
+        """Start a second tracker, which keeps silent; then it has the arm alone."""
+        elder = self.tracker
+        self.start_tracker()
+        self.wait_until(self.end + 0.5)
+        self.move_until_rivals_meet(0.0, 0.5, 0.0, 0.5)
+        assert len(self.graph.logged(ELDER)) == 1
+        self.wait_until(self.end + SETTLED)
+        assert not self.graph.logged('another node sends efforts')
+        elder.kill()
+        self._await_nothing()
+        began = monotonic()
+        # It counts as alive for three seconds after its last word.
+        self.graph.spin_until(lambda: monotonic() > began + 4.0)
+
+    def _await_nothing(self) -> None:
+        """Wait for the end of the efforts, and see that the motors are off."""
+        self.await_silence()
+        self.pass_time(LET_GO)
+        self._assert_no_effort()
+
+    def _assert_no_effort(self) -> None:
+        """Check that nothing moves the arm."""
+        effort = self.states[-1].effort[0]
+        assert not effort, f'effort {effort} N m'
+
+    def _check_efforts(self) -> None:
+        """Check that no effort was out of bounds."""
+        sent = np.array([effort.data[0] for effort in self.sent])
+        self.counts['efforts checked'] += len(sent)
+        assert np.isfinite(sent).all(), 'an effort is not finite'
+        assert (np.abs(sent) <= LIMIT).all(), f'an effort of {np.abs(sent).max()} N m'
+        self._look()
+
+    def _is_late(self) -> bool:
+        """Return whether the tracker gave up for late joint states; nothing else excuses."""
+        said = self.graph.logged('given up')
+        late = [text for text in said if 'joint sample' in text]
+        assert len(said) == len(late), said
+        return bool(late)
+
+    def _look(self) -> None:
+        """Note the memory of the nodes, and that they live."""
+        if monotonic() - self._looked < MEMORY_PERIOD:
+            return
+        self._looked = monotonic()
+        for name, process in self.processes.items():
+            assert process.exit_code is None, f'{name} has ended: {process.stderr[-2000:]}'
+            pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[1])
+            self.memory[name, process.pid].append((monotonic() - self._born, pages * 4096))
