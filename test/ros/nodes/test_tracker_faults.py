@@ -137,7 +137,8 @@ class Arm:
 
     def is_quiet(self):
         """Show where the arm is, some times; return whether nothing is answered."""
-        return not any([self.step() for _ in range(4)])
+        answers = [self.step() for _ in range(4)]
+        return not any(answers)
 
     def is_let_go_in_silence(self):
         """Let time pass without joint states; return whether the effort is zero, and why."""
