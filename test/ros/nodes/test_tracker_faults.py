@@ -59,7 +59,7 @@ class Arm:
     def start(self, **settings):
         """Start a tracker, which idles until a command; return the arm."""
         if not self.is_simulated:
-            settings['timeout'] = 1.0  # a busy machine is no silence
+            settings |= {'timeout': 1.0, 'max_age': 1.0}  # a busy machine is no silence
         given = {'use_sim_time': self.is_simulated, 'ramp': RAMP, 'timeout': 0.2, **settings}
         self.node = self.graph.create(TrackerNode, given)
         self.sent = self.graph.collect(Float64MultiArray, EFFORTS)
