@@ -20,6 +20,7 @@ from dataclasses import replace
 from math import pi
 
 from flat_planner_ros.core.arm import JointSample, PlanarArm, UncertifiedLoop
+from flat_planner_ros.core.model_fit import fit_model, Measurements
 from flat_planner_ros.core.planning import plan, PlanningOptions, PlanSamples, Strategy
 from flat_planner_ros.core.plant import SimulatedArm
 from flat_planner_ros.core.tracking import (
@@ -54,14 +55,26 @@ AFTER = 2.0
 STEP = 1e-3
 """Longest integration step [s]."""
 
+LIMITS = (np.inf, 0.3, 0.1, 0.05, 0.02, 0.014, 0.01, 0.007)
+"""Largest efforts [N m]; the plan takes 0.014."""
+
+PUSH = 3e-3
+"""Torque on the last link that starts a swing of 0.3 rad [N m]."""
+
+PUSHED = 0.03
+"""For how long it acts [s]."""
+
 MOST_LATE = 40
 """Samples of a delay that the loop does not know, at most."""
 
 
+OPTIONS = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT)
+"""Of every plan."""
+
+
 def sections(_: Namespace) -> Iterator[Section]:
     """Return the table of faults, that of rates and delays, and that of delays not known."""
-    options = PlanningOptions(strategy=Strategy.MIN_CONTROL_EFFORT)
-    samples = plan(request(), arm(), options).sample(0.005)
+    samples = plan(request(), arm(), OPTIONS).sample(0.005)
     about = "the paper's arm, 0 to pi in 1 s, least effort, encoders of 14 bits"
     yield Section(
         'Time after the motion until swing and position error stay below 5 mrad [s]',
@@ -71,7 +84,13 @@ def sections(_: Namespace) -> Iterator[Section]:
     )
     yield Section(
         'Tracked, stiffness and damping 10 % low: settling time [s], and noise while holding',
-        ['rate', 'delay', 'margin', *(f'{1e3 * noise:g} mrad of noise' for noise in NOISES)],
+        [
+            'rate',
+            'delay',
+            'bandwidth',
+            'margin',
+            *(f'{1e3 * noise:g} mrad of noise' for noise in NOISES),
+        ],
         [_corner(samples, rate, late) for rate in RATES for late in DELAYS],
         [about, 'settled: error averaged over 20 ms; then the RMS of the true error, [mrad]'],
     )
@@ -80,6 +99,18 @@ def sections(_: Namespace) -> Iterator[Section]:
         ['rate', 'certified to', 'settled to', 'unstable from'],
         [_unknown(samples, rate) for rate in RATES],
         [about, 'nominal arm; beyond the sample of delay that it does know; [ms]'],
+    )
+    yield Section(
+        'A second motion by the model fitted to the first: settled [s]; swing at the end [rad]',
+        ['arm', 'first', 'second', 'its feedback / peak effort'],
+        [_adopted(samples, true, name) for name, true in _faults().items() if name != 'nominal'],
+        [about, '500 Hz; the model by `fit_model` from the angles and efforts of the first'],
+    )
+    yield Section(
+        'A push that starts a swing of 0.3 rad while holding, over the limit of the effort',
+        ['effort_limit [N m]', 'largest effort [N m]', 'settled [s]'],
+        [_pushed(samples, limit) for limit in LIMITS],
+        [about, f'500 Hz, {PUSH:g} N m for {PUSHED:g} s on the last link'],
     )
 
 
@@ -98,8 +129,8 @@ def _faults() -> dict[str, PlanarArm]:
 
 
 def _settings(rate: float, late: int) -> TrackerSettings:
-    """Return the loop for a rate and a delay that it knows, certified for little."""
-    return TrackerSettings(rate=rate, delay=late / rate, margin=0.05)
+    """Return the loop for a rate and a delay that it knows: the fastest that is certified."""
+    return TrackerSettings(rate=rate, delay=late / rate)
 
 
 def _fault(samples: PlanSamples, name: str, true: PlanarArm) -> list[str]:
@@ -119,8 +150,9 @@ def _corner(samples: PlanSamples, rate: float, late: int) -> list[str]:
     for noise in NOISES:
         run = _Run(samples, true, Tracker(arm(), settings), rate, late, noise)
         cells.append(f'{run.settling}; {1e3 * run.left:.2g}')
-    margin = Tracker(arm(), settings).certificate.margin
-    return [f'{rate:g} Hz', f'{1e3 * late / rate:g} ms', f'{margin:.2f}', *cells]
+    found = Tracker(arm(), settings).certificate
+    loop = [f'{found.bandwidth:.3g} rad/s', f'{found.margin:.2f}']
+    return [f'{rate:g} Hz', f'{1e3 * late / rate:g} ms', *loop, *cells]
 
 
 def _unknown(samples: PlanSamples, rate: float) -> list[str]:
@@ -143,11 +175,45 @@ def _unknown(samples: PlanSamples, rate: float) -> list[str]:
     ]
 
 
+def _adopted(samples: PlanSamples, true: PlanarArm, name: str) -> list[str]:
+    """Return the row of an arm whose model is fitted to its first motion."""
+    settings = _settings(500.0, 1)
+    first = _Run(samples, true, Tracker(arm(), settings), 500.0, 1)
+    model = fit_model(first.measurements, arm()).arm
+    second = plan(request(), model, OPTIONS).sample(0.005)
+    again = _Run(second, true, Tracker(model, settings), 500.0, 1)
+    planned = np.interp(
+        again.measurements.times + 0.001, 0.05 + second.times, second.efforts[:, 0], 0, 0
+    )
+    during = again.measurements.times < 1.05
+    feedback = np.abs(again.measurements.efforts[:, 0] - planned)[during].max()
+    return [
+        name,
+        *(f'{run.settling}; {run.swing:.4f}' for run in (first, again)),
+        f'{feedback / np.abs(planned).max():.3f}',
+    ]
+
+
+def _pushed(samples: PlanSamples, limit: float) -> list[str]:
+    """Return the row of a limit."""
+    settings = replace(_settings(500.0, 1), effort_limit=(limit,))
+    tracker = Tracker(arm(), settings)
+    run = _Run(samples, arm(), tracker, 500.0, 1, pushed=1.55)
+    held = tracker.phase is Phase.TRACKING
+    return [
+        f'{limit:g}',
+        f'{run.peak:.3g}',
+        run.settled_after(1.55 + PUSHED - 1.05) if held else 'given up',
+    ]
+
+
 def _is_certified(rate: float, late: int) -> bool:
     """Tell whether the loop is certified for a number of samples that it does not know of."""
     box = Uncertainty(stiffness=0.0, damping=0.0, inertia=0.0, samples=late)
     try:
-        Tracker(arm(), replace(_settings(rate, 1), uncertainty=box, margin=0.2))
+        settings = _settings(rate, 1)
+        bandwidth = Tracker(arm(), settings).certificate.bandwidth
+        Tracker(arm(), replace(settings, uncertainty=box, bandwidth=bandwidth))
     except UncertifiedLoop:
         return False
     return True
@@ -164,6 +230,7 @@ class _Run:
         rate: float,
         late: int,
         noise: float = 0.0,
+        pushed: float = np.inf,
     ) -> None:
         begin, period = 0.05, 1.0 / rate
         plant = SimulatedArm(true, step=min(STEP, period))
@@ -177,7 +244,7 @@ class _Run:
         )
         waiting: list[np.ndarray | None] = [None] * late
         acting, self.peak = np.zeros(1), 0.0
-        times, errors = [], []
+        times, errors, shown, applied = [], [], [], []
         for k in range(round((begin + 1.0 + AFTER) * rate)):
             now = k * period
             if tracker is None:
@@ -194,8 +261,17 @@ class _Run:
             self.peak = max(self.peak, float(np.abs(acting).max()))
             times.append(now - begin - 1.0)
             errors.append(plant.position - motion.at(now).positions)
+            shown.append(ENCODER * np.round(plant.position / ENCODER))
+            applied.append(acting)
+            if 0.0 <= now - pushed < period:  # a torque on the last link acts at both joints
+                plant.push([PUSH, PUSH], now + PUSHED)
             plant.hold(acting)
             plant.advance(now + period)
+        self.measurements = Measurements(
+            times=np.array(times) + begin + 1.0,
+            positions=np.array(shown),
+            efforts=np.array(applied),
+        )
         after = np.array(times) >= 0.0
         self._times, self._errors = np.array(times)[after], np.array(errors)[after]
         self._width = max(1, round(0.02 * rate)) if noise else 1
@@ -219,6 +295,17 @@ class _Run:
         if not self.has_settled:
             return f'> {AFTER:g}'
         return f'{self._beyond[-1]:.2f}' if self._beyond.size else '0.00'
+
+    def settled_after(self, since: float) -> str:
+        """Return the time from then on until errors stay in the band, as text [s]."""
+        return f'{max(0.0, self._beyond[-1] - since):.2f}' if self.has_settled else 'not'
+
+    @property
+    def swing(self) -> float:
+        """Return the envelope of the passive joint's error at the end of the motion [rad]."""
+        error, mode = self._errors[:, 1], arm().natural_mode()
+        rate = (error[1] - error[0]) / (self._times[1] - self._times[0])
+        return float(np.hypot(error[0], rate / mode.frequency))
 
     @property
     def left(self) -> float:

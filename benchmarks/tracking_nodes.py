@@ -42,14 +42,11 @@ BAND = 5e-3
 AFTER = 1.5
 """Time that is looked at after a motion or a push [s]."""
 
-PUSH = 0.4
-"""Effort of joint 1 that starts a swing of 0.3 rad [N m]."""
+PUSH = 3e-3
+"""Torque on the last link that starts a swing of 0.3 rad [N m]."""
 
 PUSHED = 0.03
 """For how long it acts [s]."""
-
-BEGUN = 1e-3
-"""Effort from which a motion has begun [N m]."""
 
 PUSHED_ROW = 'push while holding'
 """The row in which the arm is pushed where a motion has ended."""
@@ -150,7 +147,7 @@ def _row(heard: Listener, name: str, samples: PlanSamples, speed: float) -> list
             name,
             'given up' if given_up else seen.settling(since),
             '' if name in ('nominal', PUSHED_ROW) else seen.swing(fault.arm, samples),
-            f'{seen.peak(seen.end) / np.abs(samples.efforts).max():.2f}',
+            f'{seen.peak() / np.abs(samples.efforts).max():.2f}',
             *seen.health,
         ]
 
@@ -234,7 +231,8 @@ class _Record:
 
     def push(self) -> float:
         """Push the arm; return when that is over [s]."""
-        self._pushes.publish(Float64MultiArray(data=[PUSH, 0.0]))
+        # A torque on the last link acts at both joints.
+        self._pushes.publish(Float64MultiArray(data=[PUSH, PUSH]))
         begin = self.now
         self.wait(begin + PUSHED)
         self._pushes.publish(Float64MultiArray(data=[0.0, 0.0]))
@@ -259,13 +257,9 @@ class _Record:
         late = float(beyond[-1]) - since if beyond.size else 0.0
         return f'{late:.2f}' if late < 0.9 * AFTER else f'> {0.9 * AFTER:.2f}'
 
-    def peak(self, until: float) -> float:
-        """Return the largest effort of the motion [N m]."""
-        return max(
-            abs(state.effort[0])
-            for state in self.states
-            if stamps.seconds(state.header.stamp) <= until
-        )
+    def peak(self) -> float:
+        """Return the largest effort [N m]."""
+        return max(abs(state.effort[0]) for state in self.states)
 
     def swing(self, true: PlanarArm, samples: PlanSamples) -> str:
         """Return the swing at the end of the motion over that of the effort alone."""

@@ -133,7 +133,26 @@ def test_a_swing_dies_away_within_the_limits(name, limit):
     assert tracker.phase is Phase.TRACKING
 
 
-def test_a_push_while_holding_dies_away():
+@pytest.mark.parametrize('limit', [np.inf, 0.02])
+def test_a_push_at_the_last_link_dies_away(limit):
+    """It starts a swing of 0.3 rad, and takes little more effort than the motion of 1 s to pi."""
+    tracker = Tracker(ARM, replace(SETTINGS, effort_limit=(limit,)))
+    loop = ClosedLoop(tracker, ARM, late=1)
+    loop.run(START)
+    tracker.follow(motion_of(samples_of(final=[0.2, 0.0]), loop.arm.time), loop.arm.time)
+    loop.run(1.1)
+    end = loop.arm.time + 0.03
+    loop.arm.push([3.2e-3, 3.2e-3], end)  # a torque on the last link acts at both joints
+    times, positions, efforts = loop.run(1.2)
+    errors = positions - [0.2, 0.0]
+    assert np.abs(errors[:, 1]).max() > 0.3
+    assert settling(times, errors, end) <= 0.9
+    assert np.abs(efforts).max() <= min(limit, 0.03)
+    assert tracker.phase is Phase.TRACKING
+
+
+def test_a_push_that_turns_the_whole_arm_dies_away():
+    """At joint 1, with a hundred times the momentum: the effort is as large as the push."""
     tracker = Tracker(ARM, SETTINGS)
     loop = ClosedLoop(tracker, ARM, late=1)
     loop.run(START)
