@@ -26,7 +26,7 @@ MILLI = 1e3
 
 def draw_fit(measurements: Measurements, fit: ModelFit, path: Path) -> None:
     """
-    Write a figure: both angles as measured and as simulated, and what is left.
+    Write a figure: both angles as measured and as simulated, what is left, what is not told.
 
     Parameters
     ----------
@@ -56,6 +56,8 @@ def draw_fit(measurements: Measurements, fit: ModelFit, path: Path) -> None:
     axes[2].legend(frameon=False)
     for axis in axes:
         axis.grid(alpha=0.3)
-    figure.suptitle(fit.misfit or 'noise explains what the model leaves', fontsize=9)
+    untold = ', '.join(each.name for each in fit.estimates if not each.is_told)
+    verdict = fit.misfit or 'noise explains what the model leaves'
+    figure.suptitle(f'{verdict}\nnot told: {untold or "nothing"}', fontsize=9, wrap=True)
     figure.savefig(path, dpi=110)
     plt.close(figure)
