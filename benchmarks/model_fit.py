@@ -31,7 +31,7 @@ from measurement import Section
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / 'test'))
-from free_arm import measured, pushes  # noqa: E402  It is a part of the tests.
+from free_arm import measured, pushes  # noqa: E402, I100  It is a part of the tests.
 from recorded_arm import recorded  # noqa: E402
 
 SENSORS = {

@@ -24,7 +24,7 @@ from recorded_arm import commanded
 
 mujoco = pytest.importorskip('mujoco')
 
-from mujoco_model import mujoco_model  # noqa: E402
+from mujoco_model import mujoco_model  # noqa: E402, I100
 
 PERIOD, SUBSTEPS = 0.005, 10
 """Time between samples [s], and steps of the integration in it."""
