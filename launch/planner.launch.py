@@ -156,6 +156,11 @@ def _nodes(context: LaunchContext) -> list[Node]:
     if strategy:
         planner.append({'strategy': strategy})
     action = LaunchConfiguration('command_action').perform(context)
+    if action and LaunchConfiguration('tracker').perform(context) == 'true':
+        raise RuntimeError(
+            'command_action and tracker exclude each other: with an action nothing is on the '
+            'topic that the tracker hears'
+        )
     if action:
         planner.append({'command.interface': 'action', 'command.action': action})
     return [

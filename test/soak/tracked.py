@@ -231,7 +231,7 @@ class TrackedSoak(Tracked):
     def _is_late(self) -> bool:
         """Return whether the tracker gave up for late joint states; nothing else excuses."""
         said = self.graph.logged('given up')
-        late = [text for text in said if 'joint sample' in text]
+        late = [text for text in said if 'joint sample' in text or 'joint states' in text]
         assert len(said) == len(late), said
         return bool(late)
 

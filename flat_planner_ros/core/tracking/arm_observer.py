@@ -19,6 +19,7 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import FloatArray, JointSample, PlanarArm
 from flat_planner_ros.core.tracking.chain import last_links, linearised_joint
 from flat_planner_ros.core.tracking.observer import Observer
+from flat_planner_ros.core.tracking.tracked_motion import UNUSABLE
 import numpy as np
 
 
@@ -89,7 +90,7 @@ class ArmObserver:
     def restart(self, sample: JointSample) -> None:
         """Take a sample for the truth; at rest, unless it has velocities."""
         q, dq = sample.positions, sample.velocities
-        if dq is None or not np.isfinite(dq).all():
+        if dq is None or not (np.abs(dq) < UNUSABLE).all():
             dq = np.zeros(q.size)
         self._links.restart(sample.time, links_of(q), links_of(dq))
         self._joints.restart(sample.time, q[None, :-2], dq[None, :-2])

@@ -19,6 +19,9 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import FloatArray, InvalidCommand, SampledMotion
 import numpy as np
 
+UNUSABLE = 1e6
+"""Number from which an angle, speed or acceleration is no arm's [rad], [rad/s], [rad/s^2]."""
+
 
 class Reference(NamedTuple):
     """
@@ -76,11 +79,11 @@ class TrackedMotion:
             )
         if not (np.diff(times) > 0.0).all():
             raise InvalidCommand('times must increase')
+        given = [table for table in (positions, velocities, accelerations) if table is not None]
+        if not (np.isfinite(start) and all((np.abs(t) < UNUSABLE).all() for t in given)):
+            raise InvalidCommand(f'a motion must be finite, its numbers below {UNUSABLE:g}')
         if accelerations is None:
             accelerations = np.gradient(velocities, times, axis=0)
-        tables = (positions, velocities, accelerations)
-        if not (np.isfinite(start) and all(np.isfinite(table).all() for table in tables)):
-            raise InvalidCommand('a motion must be finite')
         if velocities[-1].any():
             raise InvalidCommand(f'the last velocity must be 0 rad/s, got {velocities[-1]}')
         self._start, self._times = float(start), times

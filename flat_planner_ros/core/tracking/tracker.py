@@ -28,7 +28,7 @@ from flat_planner_ros.core.tracking.arm_observer import Estimate
 from flat_planner_ros.core.tracking.certificate import certify
 from flat_planner_ros.core.tracking.settings import TrackerSettings
 from flat_planner_ros.core.tracking.state_feedback import distance, StateFeedback
-from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion
+from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion, UNUSABLE
 from flat_planner_ros.core.tracking.watches import AgeWatch, GrowthWatch
 import numpy as np
 
@@ -168,8 +168,10 @@ class Tracker:
             Shape (n-1,) [N m], to act the loop's delay from now on; None if nothing is to be sent.
 
         """
-        if not np.isfinite(sample.positions).all():
-            self._give_up(now, f'a joint sample is not finite: {sample.positions.tolist()} rad')
+        if not (np.abs(sample.positions) < UNUSABLE).all():
+            is_finite = bool(np.isfinite(sample.positions).all())
+            what = f'beyond {UNUSABLE:g} rad' if is_finite else 'not finite'
+            self._give_up(now, f'a joint sample is {what}: {sample.positions.tolist()} rad')
         elif sample.time > self._heard or sample.time < self._heard - self._settings.timeout:
             self._measure(sample, now)
             if self.ages.mean > self._max_age:

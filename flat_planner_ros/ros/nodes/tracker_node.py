@@ -26,6 +26,7 @@ from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import arm_sentence
 from flat_planner_ros.ros.nodes.joint_state_input import JointStateInput
 from flat_planner_ros.ros.nodes.node_runner import run
+from flat_planner_ros.ros.nodes.rate_watch import RateWatch
 from flat_planner_ros.ros.nodes.rival_watch import RivalWatch
 from flat_planner_ros.ros.nodes.tracker_renewal import TrackerRenewal
 from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
@@ -58,7 +59,8 @@ class TrackerNode(GuardedNode):
     def __init__(self, **options: Any) -> None:
         """Read the parameters and open the interface; options as for `rclpy.node.Node`."""
         super().__init__(interfaces.TRACKER, **options)
-        settings = NodeParameters(self, ROWS, build, self._apply).settings
+        self._configuration = NodeParameters(self, ROWS, build, self._apply)
+        settings = self._configuration.settings
         self._joints = settings.joints
         self._tracker = Tracker(settings.arm, settings.tracker)
         self._renewal = TrackerRenewal(settings.arm, settings.tracker)
@@ -75,6 +77,7 @@ class TrackerNode(GuardedNode):
         listen(DiagnosticArray, status, self._on_status, interfaces.LATCHED_HISTORY)
         self._watch = GraphWatch(self, self._log, [efforts, command], [states], is_listening=True)
         self._input = JointStateInput(self._log, self._watch, self._now)
+        self._rate = RateWatch(settings.tracker.rate)
         self._rivals = RivalWatch(
             self,
             self._efforts,
@@ -133,6 +136,7 @@ class TrackerNode(GuardedNode):
         samples = self._input.samples(self._reader, msg)
         self._tracker = self._renewal.renewed(self._tracker, self._now())
         for sample in samples:
+            self._rate.heard(sample.time)
             self._send(self._tracker.hear(sample, max(self._now(), sample.time)))
 
     def _on_look(self) -> None:
@@ -162,9 +166,9 @@ class TrackerNode(GuardedNode):
     def _on_health(self) -> None:
         """Say what the tracker does."""
         self._renewal.adopt(None)  # what has come while another one was made
-        refusal = self._renewal.take_refusal()
-        if refusal:
-            self._log.warning(refusal)
+        for remark in (self._renewal.take_refusal(), self._rate.take_remark()):
+            if remark:
+                self._log.warning(remark)
         self._introduce()
 
     def _introduce(self) -> None:

@@ -30,8 +30,10 @@ from builtin_interfaces.msg import Duration, Time
 from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.nodes.plant_node import PlantNode
+from flat_planner_ros.ros.nodes.tracker_node import TrackerNode
 from flat_planner_ros.ros.parameters.planner import ROWS
 from flat_planner_ros.ros.parameters.plant import ROWS as PLANT_ROWS
+from flat_planner_ros.ros.parameters.tracker import ROWS as TRACKER_ROWS
 from flat_planner_ros.ros.wire import interfaces, stamps
 from flat_planner_ros.ros.wire.conversions import goal_from_trajectory
 from hypothesis import given, HealthCheck, Phase, settings
@@ -308,10 +310,44 @@ def test_random_trajectories_and_efforts_never_drive_the_plant_mad(graph):
         graph.expect(lambda received=received: received, 'the plants go on')
 
 
+def test_random_messages_never_make_a_tracker_send_what_it_must_not(graph):
+    limit = 0.01
+    tracker = graph.create(TrackerNode, {'limits.effort': [limit], 'timeout': 1.0, 'max_age': 1.0})
+    sent = graph.collect(Float64MultiArray, '/flat_tracker/effort_commands')
+    still = JointState(name=['joint1', 'joint2'], position=[0.0, 0.0])
+    points = [
+        JointTrajectoryPoint(
+            positions=[0.0, 0.0], velocities=[0.0, 0.0], time_from_start=Duration(sec=k)
+        )
+        for k in range(2)
+    ]
+    hold = JointTrajectory(joint_names=['joint1', 'joint2'], points=points)
+
+    def show(state, *commands):
+        state.header.stamp = stamps.time_msg(now_of(tracker))
+        graph.publish('/joint_states', state)
+        for command in commands:
+            graph.publish('/flat_planner/joint_trajectory', command)
+        graph.spin_until(lambda: False, 0.01)
+
+    @random_messages(60)
+    @given(trajectories(effort=True), joint_states())
+    def send(trajectory, state):
+        show(still, hold)
+        show(state, hold, trajectory)
+        efforts = np.array([value for message in sent for value in message.data])
+        assert np.isfinite(efforts).all()
+        assert (np.abs(efforts) <= limit).all()
+
+    graph.expect(lambda: show(still, hold) or sent, 'efforts')
+    send()
+    assert not graph.logged('internal error')
+
+
 @pytest.mark.parametrize(
     ('node_class', 'rows'),
-    [(PlannerNode, ROWS), (PlantNode, PLANT_ROWS)],
-    ids=['planner', 'plant'],
+    [(PlannerNode, ROWS), (PlantNode, PLANT_ROWS), (TrackerNode, TRACKER_ROWS)],
+    ids=['planner', 'plant', 'tracker'],
 )
 def test_random_parameters_are_refused_or_consistent(graph, node_class, rows):
     node = graph.create(node_class)
