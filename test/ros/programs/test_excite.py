@@ -71,12 +71,11 @@ def test_a_rough_file_becomes_a_good_one(graph, tmp_path):
         SCALES['inertia'] * 3.3e-5,
         SCALES['stiffness'] * 3e-3,
         SCALES['damping'] * 2e-5,
-        *np.ravel(list(FRICTION.values())),
     ]
+    assert [*arm.inertia_star, arm.stiffness, arm.damping] == pytest.approx(true, rel=0.06)
+    # What is sure is friction relative to the effort, of which it is a small part.
     friction = [arm.viscous_friction[-1], arm.coulomb_friction[-1]]
-    assert [*arm.inertia_star, arm.stiffness, arm.damping, *friction] == pytest.approx(
-        true, rel=0.06
-    )
+    assert friction == pytest.approx(np.ravel(list(FRICTION.values())), rel=0.2)
     said = bench.process.stdout
     assert 'joint1 from -1.5 to 1.5 rad, with at most 0.015 N m' in said
     assert 'predicted,' in said
