@@ -263,7 +263,9 @@ def refine(
         if _is_small(step, best, scales[list(free)]) or damping > MOST_DAMPING:
             break
         trial = _stepped(point, best, step, free)
-        there = linearised(observed, *trial, free, scales, spread)
+        # A model that a bad step makes unstable leaves all bounds, and is refused by its cost.
+        with np.errstate(over='ignore', invalid='ignore'):
+            there = linearised(observed, *trial, free, scales, spread)
         is_better = there.cost <= best.cost * (1.0 + 1e-12)
         if is_better:
             point, best, damping = trial, there, damping / 10 if damping > 1e-6 else 0.0
