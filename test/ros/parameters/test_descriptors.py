@@ -37,6 +37,7 @@ WITHOUT_UNIT = {
     'weights.effort': 'a ratio of rates',
     'weights.energy': 'a ratio of rates',
     'weights.Q': 'each entry has another one',
+    'drift.false_alarms': 'a share',
     'insensitivity.stiffness': 'a share',
     'insensitivity.damping': 'a share',
     'insensitivity.inertia': 'a share',

@@ -15,11 +15,14 @@
 """Long recordings: reports as they come, files of one time together, progress on a terminal."""
 
 from array import array
+import fcntl
 import os
 from pathlib import Path
 import pty
+import struct
 import subprocess
 import sys
+import termios
 
 from flat_planner_ros.core.monitor import MonitorSettings
 from flat_planner_ros.ros.wire import interfaces, stamps
@@ -134,6 +137,7 @@ with progress(2.0, 'work') as advance:
 def shown(*arguments: str) -> str:
     """Return what a program shows on a terminal of its progress."""
     reader, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack('HHHH', 24, 80, 0, 0))
     try:
         command = [sys.executable, *arguments, '-c', PROGRAM]
         done = subprocess.run(command, stderr=terminal, stdout=subprocess.PIPE, check=True)
