@@ -84,6 +84,6 @@ for axis, (loop, title) in zip(axes, LOOPS.items(), strict=True):
     axis.grid(alpha=0.3)
 axes[0].set_ylabel('oscillation left [rad]')
 axes[0].set_ylim(1e-4, 1.0)
-axes[0].legend(frameon=False, fontsize=7, loc='lower left')
-figure.tight_layout()
+figure.legend(*axes[0].get_legend_handles_labels(), frameon=False, ncols=5, loc='lower center')
+figure.tight_layout(rect=(0.0, 0.06, 1.0, 1.0))
 figure.savefig(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).with_suffix('.png'), dpi=100)

@@ -95,6 +95,7 @@ for label, errors, style in (('predicted', predicted, 'o--'), ('reached', reache
 below.axhline(1.0, color='gray', linestyle=':')
 below.set_xticks(numbers)
 below.yaxis.set_major_formatter('{x:g}')
+below.yaxis.set_minor_formatter('{x:.2g}')
 below.set_xlabel('motion')
 below.set_ylabel('largest standard error [%]')
 below.legend(frameon=False)

@@ -21,15 +21,17 @@ motion, the report after it.
 """
 
 from collections.abc import Sequence
-import gc
 from importlib import import_module
-from threading import Lock, Thread
+from threading import Event, Lock, Thread
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 LOADING = Lock()
 """Held while one node loads: parts of SciPy that two threads load at once may see halves."""
+
+LOADED = Event()
+"""Set once a node of this process has loaded all that it will need."""
 
 PLANNING = ('scipy.linalg.lapack', 'scipy.optimize')
 """Modules that planning through via points, in motion or from a swing needs."""
@@ -53,8 +55,7 @@ def load_early(node: Node, libraries: Sequence[str]) -> None:
         with LOADING:
             for library in libraries:
                 import_module(library)
-        # As when the node was ready: nothing of this needs to be collected.
-        gc.freeze()
+        LOADED.set()
 
     def start() -> None:
         timer.cancel()

@@ -27,6 +27,7 @@ from threading import Event
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.programs import SIGNALS
 from flat_planner_ros.ros.nodes.certain_end import certain_end
+from flat_planner_ros.ros.nodes.early_loading import LOADED
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import introduce
 from flat_planner_ros.version import ShowVersion
@@ -112,11 +113,13 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
             for node in nodes:
                 node.get_logger().info('ready')
             is_ready = True
-            # A collection would look at every object of every module again, for 40 ms each time,
-            # in which a goal or a sample waits.
-            gc.freeze()
+            _leave_alone()
+            is_settled = False
             while rclpy.ok() and not interrupted.is_set():
                 executor.spin_once(timeout_sec=SPIN_PERIOD)
+                if LOADED.is_set() and not is_settled:
+                    is_settled = True
+                    _leave_alone()
         except ExternalShutdownException:
             pass
         # RuntimeError is what rcl raises for arguments and parameter files it cannot read, and for
@@ -137,6 +140,16 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
                 node.destroy_node()
             rclpy.try_shutdown()
     return 0
+
+
+def _leave_alone() -> None:
+    """
+    Take all that there is out of the garbage collector's sight.
+
+    It would look at every object of every module again, for 40 ms each time, in which a goal or a
+    sample waits. Only where the process is the nodes' own: what is frozen is never collected.
+    """
+    gc.freeze()
 
 
 def _explained(error: Exception) -> int:

@@ -135,7 +135,7 @@ class ResultFile:
     def __init__(self, path: Path, study: Study, fingerprint: str, *, is_fresh: bool) -> None:
         self._path, self._study = path, study
         self._mark = _mark_of(path)
-        header = ','.join(titles_of(study)) + '\n'
+        header = self._header = ','.join(titles_of(study)) + '\n'
         self.done = 0
         """Rows that are there."""
         if not is_fresh and path.exists() and path.stat().st_size:
@@ -159,8 +159,10 @@ class ResultFile:
         self.done += lines.count('\n')
 
     def close(self) -> None:
-        """Write no more."""
+        """Write no more; what an interrupt has left of a chunk is cut off."""
         self._file.close()
+        if self.done < self._study.count:
+            self.done = self._keep_whole_chunks(self._header)
 
     def _check(self, fingerprint: str) -> None:
         """Refuse a file that another study has made."""
