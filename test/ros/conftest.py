@@ -42,6 +42,9 @@ with suppress(ImportError):  # without ROS every test here is skipped (test/conf
     from rclpy.parameter_client import AsyncParameterClient
     from rclpy.qos import DurabilityPolicy, QoSProfile
 
+LINES_SHOWN = 12
+"""Lines of the nodes that a failure shows."""
+
 TIMEOUT = 60.0
 """Time in which anything must happen that happens at all [s]; on an idle machine it is 10 ms."""
 
@@ -240,7 +243,9 @@ class Graph:
 
     def expect(self, condition: Callable[[], object], what: str, timeout: float = TIMEOUT) -> None:
         """Fail with a message unless a condition comes to hold before the deadline."""
-        assert self.spin_until(condition, timeout), f'not within {timeout:g} s: {what}'
+        if not self.spin_until(condition, timeout):
+            said = ''.join(f'\n{entry.name}: {entry.msg}' for entry in self.log[-LINES_SHOWN:])
+            pytest.fail(f'not within {timeout:g} s: {what}; last heard:{said}')
 
     def collect(
         self, message_type: type, topic: str, qos: Any = 1000, *, matched: bool = True

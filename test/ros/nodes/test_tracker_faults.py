@@ -216,12 +216,11 @@ def test_after_the_motion_the_pose_is_held_or_let_go(arm, hold):
     arm.start(hold=hold)
     arm.command()
     arm.move_into(1.2)
-    count = len(arm.sent)
     if hold:
+        count = len(arm.sent)
         arm.graph.expect(lambda: arm.step() and len(arm.sent) > count + 3, 'efforts that go on')
     else:
-        assert arm.is_quiet()
-        assert len(arm.sent) == count
+        arm.graph.expect(arm.is_quiet, 'silence')  # answers may be on their way
         assert arm.sent[-1].data[0] == 0.0
     assert not arm.errors()
     if hold:

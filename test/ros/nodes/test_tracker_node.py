@@ -132,7 +132,11 @@ def test_a_tracker_that_is_held_up_again_and_again_lets_go_with_one_error(graph)
     arm.tracker.kill()
     arm.start_tracker(max_age=0.0)
     arm.move(0.5)
-    graph.expect(lambda: arm.states[-1].position[0] > 0.01, 'a motion')
+    # A machine may be so busy that it lets go before it has moved the arm.
+    graph.expect(
+        lambda: arm.states[-1].position[0] > 0.01 or graph.logged('given up'),
+        'a motion',
+    )
     for _ in range(50):
         arm.tracker.pause()
         arm.pass_time(0.08)
