@@ -74,23 +74,25 @@ class Tracked(Rig):
         """Send a goal, and again where a tracker that has just started let the command pass."""
         while True:
             ignored, missed = (len(self.graph.logged(text)) for text in (UNSEEN, NOT_MOVED))
+            place = self.states[-1].position[0]
             verdict = super().move(positions, duration)
-            if not self._is_ignored(ignored):
-                return verdict
-            self.graph.expect(
-                lambda count=missed: len(self.graph.logged(NOT_MOVED)) > count, 'a verdict'
+            self.graph.spin_until(
+                lambda at=place, ignored=ignored, missed=missed: (
+                    abs(self.states[-1].position[0] - at) > 1e-3
+                    or len(self.graph.logged(UNSEEN)) > ignored
+                    or len(self.graph.logged(NOT_MOVED)) > missed
+                )
             )
-
-    def _is_ignored(self, count):
-        """Return whether the command was let pass, and nobody else plays it."""
-        self.graph.spin_until(
-            lambda: len(self.graph.logged(UNSEEN)) > count or stamp(self.states[-1]) > self.begin
-        )
-        if len(self.graph.logged(UNSEEN)) == count:
-            return False
-        place = self.states[-1].position[0]
-        self.wait_until(self.begin + 0.5 * (self.end - self.begin))
-        return abs(self.states[-1].position[0] - place) < 1e-3
+            if len(self.graph.logged(UNSEEN)) == ignored:
+                return verdict
+            self.graph.spin_until(
+                lambda at=place, missed=missed: (
+                    abs(self.states[-1].position[0] - at) > 1e-3
+                    or len(self.graph.logged(NOT_MOVED)) > missed
+                )
+            )
+            if len(self.graph.logged(NOT_MOVED)) == missed:
+                return verdict
 
     def _trackers(self):
         """Return the ends of the trackers that commands are sent to."""
