@@ -21,31 +21,29 @@ it at any time: the arm is brought to rest.
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from pathlib import Path
 import sys
 from threading import Event
 from typing import TextIO
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.excitation import Excitation, ExcitationSettings, Heard, Proposal, Room
-from flat_planner_ros.core.model_fit import fit_model, ModelFit, NAMES
+from flat_planner_ros.core.model_fit import fit_model, NAMES
 from flat_planner_ros.core.planning import JointLimits
 from flat_planner_ros.core.session import SessionSettings
 from flat_planner_ros.programs import INTERRUPTED
 from flat_planner_ros.ros.nodes.node_runner import signals_caught
 from flat_planner_ros.ros.parameters import planner as planner_parameters
-from flat_planner_ros.ros.parameters.fitted_file import write_fitted
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.programs.command_line import (
     explain_os,
-    figure_name,
     missing_for_plot,
     number_above_zero,
     parsed,
     split_arguments,
 )
 from flat_planner_ros.ros.programs.exciter import Aborted, ExcitationFailed, Exciter
-from flat_planner_ros.ros.programs.outputs import check_writable, summary_stream, write_through
+from flat_planner_ros.ros.programs.fit_outputs import add_files, write_files
+from flat_planner_ros.ros.programs.outputs import check_writable, summary_stream
 from flat_planner_ros.ros.wire import interfaces
 import numpy as np
 import rclpy
@@ -110,7 +108,7 @@ def _run(settings: SessionSettings, options: Namespace, interrupted: Event) -> i
     seen = excitation.measurements
     fit = fit_model(seen, settings.arm, with_imbalance=True)
     print(fit.text, file=summary)
-    _write(options, settings, excitation, fit)
+    write_files(options, settings.arm, excitation.measurements, fit)
     return 0 if excitation.is_certain and not fit.misfit else 1
 
 
@@ -183,25 +181,6 @@ def _share(error: float) -> str:
     return f'{100.0 * error:.2g} %' if np.isfinite(error) and error < 1.0 else 'unknown'
 
 
-def _write(
-    options: Namespace, settings: SessionSettings, excitation: Excitation, fit: ModelFit
-) -> None:
-    """Write the files that are asked for."""
-    if options.plot is not None:
-        # Imported here: matplotlib is an extra.
-        from flat_planner_ros.figures.fit_figure import draw_fit
-
-        write_through(
-            options.plot, lambda path: draw_fit(excitation.measurements, fit, path), '.png'
-        )
-    if options.output is not None:
-        write_through(
-            options.output,
-            lambda path: write_fitted(options.params_file, fit, settings.arm, path),
-            '.yaml',
-        )
-
-
 def _parser() -> ArgumentParser:
     """Return the parser of the own arguments."""
     parser = ArgumentParser(
@@ -213,20 +192,7 @@ def _parser() -> ArgumentParser:
         epilog='Another namespace: --namespace /arm1 --ros-args -r __ns:=/arm1',
     )
     add = parser.add_argument
-    add(
-        '--params-file',
-        metavar='FILE',
-        type=Path,
-        required=True,
-        help='parameter file of the planner: the model as believed, and limits.effort',
-    )
-    add('-o', '--output', metavar='FILE', help='parameter file to write, or -')
-    add(
-        '--plot',
-        metavar='FILE',
-        type=figure_name,
-        help='measured and simulated motion, .png, .pdf or .svg, or -',
-    )
+    add_files(parser, 'parameter file of the planner: the model as believed, and limits.effort')
     add(
         '--accuracy',
         type=number_above_zero,

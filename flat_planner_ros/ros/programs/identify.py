@@ -22,16 +22,15 @@ import sys
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.model_fit import fit_model, Trust
 from flat_planner_ros.ros.parameters import planner as planner_parameters
-from flat_planner_ros.ros.parameters.fitted_file import write_fitted
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.programs.command_line import (
     explain_missing,
     explain_os,
-    figure_name,
     missing_for_plot,
     parsed,
 )
-from flat_planner_ros.ros.programs.outputs import check_writable, summary_stream, write_through
+from flat_planner_ros.ros.programs.fit_outputs import add_files, write_files
+from flat_planner_ros.ros.programs.outputs import check_writable, summary_stream
 from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.wire import interfaces
 
@@ -75,17 +74,7 @@ def main(args: Sequence[str] | None = None) -> int:
             )
         fit = fit_model(found, settings.arm, trust=Trust(options.trust), with_imbalance=True)
         print(fit.text, file=summary_stream(options.output, options.plot))
-        if options.plot is not None:
-            # Imported here: matplotlib is an extra.
-            from flat_planner_ros.figures.fit_figure import draw_fit
-
-            write_through(options.plot, lambda path: draw_fit(found, fit, path), '.png')
-        if options.output is not None:
-            write_through(
-                options.output,
-                lambda path: write_fitted(options.params_file, fit, settings.arm, path),
-                '.yaml',
-            )
+        write_files(options, settings.arm, found, fit)
     except FlatPlannerError as error:
         print(f'identify: {error}', file=sys.stderr)
         return 1
@@ -103,20 +92,7 @@ def _parser() -> ArgumentParser:
     )
     add = parser.add_argument
     add('files', metavar='FILE', nargs='+', type=Path, help='recordings, as for analyse, or .csv')
-    add(
-        '--params-file',
-        metavar='FILE',
-        type=Path,
-        required=True,
-        help='parameter file with the model as believed so far',
-    )
-    add('-o', '--output', metavar='FILE', help='parameter file to write, or -')
-    add(
-        '--plot',
-        metavar='FILE',
-        type=figure_name,
-        help='measured and simulated motion, .png, .pdf or .svg, or -',
-    )
+    add_files(parser, 'parameter file with the model as believed so far')
     add(
         '--trust',
         choices=[trust.value for trust in Trust],
