@@ -73,26 +73,29 @@ class Tracked(Rig):
     def move(self, positions, duration=1.0):
         """Send a goal, and again where a tracker that has just started let the command pass."""
         while True:
-            ignored, missed = (len(self.graph.logged(text)) for text in (UNSEEN, NOT_MOVED))
-            place = self.states[-1].position[0]
-            verdict = super().move(positions, duration)
-            self.graph.spin_until(
-                lambda at=place, ignored=ignored, missed=missed: (
-                    abs(self.states[-1].position[0] - at) > 1e-3
-                    or len(self.graph.logged(UNSEEN)) > ignored
-                    or len(self.graph.logged(NOT_MOVED)) > missed
-                )
-            )
-            if len(self.graph.logged(UNSEEN)) == ignored:
+            verdict, is_let_pass = self._try_to_move(positions, duration)
+            if not is_let_pass:
                 return verdict
-            self.graph.spin_until(
-                lambda at=place, missed=missed: (
-                    abs(self.states[-1].position[0] - at) > 1e-3
-                    or len(self.graph.logged(NOT_MOVED)) > missed
-                )
-            )
-            if len(self.graph.logged(NOT_MOVED)) == missed:
-                return verdict
+
+    def _try_to_move(self, positions, duration):
+        """Send a goal; return its verdict, and whether a tracker let pass what nobody played."""
+        place = self.states[-1].position[0]
+        ignored, missed = (len(self.graph.logged(text)) for text in (UNSEEN, NOT_MOVED))
+        verdict = super().move(positions, duration)
+
+        def is_missed():
+            return len(self.graph.logged(NOT_MOVED)) > missed
+
+        def is_ignored():
+            return len(self.graph.logged(UNSEEN)) > ignored
+
+        def is_over():
+            return is_missed() or abs(self.states[-1].position[0] - place) > 1e-3
+
+        self.graph.spin_until(lambda: is_ignored() or is_over())
+        if is_ignored():
+            self.graph.spin_until(is_over)
+        return verdict, is_ignored() and is_missed()
 
     def _trackers(self):
         """Return the ends of the trackers that commands are sent to."""
