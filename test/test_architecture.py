@@ -269,7 +269,11 @@ def test_message_packages_have_few_importers(path):
 
 
 def test_versions_agree():
-    assert manifest('version') == {setup_arguments()['version']}
+    version = setup_arguments()['version']
+    assert manifest('version') == {version}
+    # Only so is it found by catkin_prepare_release, which renews these two and no other file.
+    assert (CHECKOUT / 'setup.py').read_text('utf-8').count(f"version='{version}',") == 1
+    assert not re.search(r'^version:', (CHECKOUT / 'CITATION.cff').read_text('utf-8'), re.M)
 
 
 def test_descriptions_of_the_package_agree():
