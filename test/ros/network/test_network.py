@@ -15,10 +15,11 @@
 """Planner and plant on two computers: a network that loses, delays and reorders packets."""
 
 from pathlib import Path
+from time import monotonic
 
 from flat_planner_ros.ros.dds_profile import OWN_FILES, profile_environment, VARIABLES
 import pytest
-from ros.conftest import Graph
+from ros.conftest import Graph, TIMEOUT
 from ros.network.two_computers import Network, NO_HARM, PROFILES
 
 DURATION = 0.5
@@ -26,8 +27,11 @@ DURATION = 0.5
 MISS = 1e-3
 """Distance from its goal up to which an arm has played its command [rad]."""
 
-BEHIND = 0.2
-"""By how much the clock of the plant is behind [s]; one that is ahead so far is refused."""
+THERE = 0.1
+"""Distance from its goal up to which an arm is there, `finish.position_tolerance` [rad]."""
+
+APART = 0.2
+"""By how much the clocks differ [s]."""
 
 ATTEMPTS = 3
 """How often a motion is repeated on a machine that is too busy to play it in time."""
@@ -35,7 +39,12 @@ ATTEMPTS = 3
 PARTITION = 3.0
 """Time for which nothing gets through [s]."""
 
-STALE = 3
+SETTLED = 1.0
+"""Time after a motion in which both monitors have reported it [s]."""
+
+OK, STALE = 0, 3
+
+ANSWERS = ('ACCEPTED', 'REJECTED')
 
 
 @pytest.fixture(scope='module')
@@ -65,16 +74,48 @@ def user(network):
     return network.user()
 
 
-@pytest.mark.parametrize(('loss', 'count'), [(0.0, 2), (0.01, 3), (0.05, 3), (0.2, 4)])
-def test_every_accepted_goal_is_played_or_failed(network, user, loss, count):
-    network.be(0.02, 0.01, loss)
+HARM = {
+    'delay': (0.02, 0.01, 0.0),
+    'loss of 1 %': (0.02, 0.01, 0.01),
+    'loss of 5 %': (0.02, 0.01, 0.05),
+    'loss of 20 %': (0.02, 0.01, 0.2),
+}
+"""Delay [s], what is added to it at random [s], by which frames overtake each other, and loss."""
+
+
+def told_truly(known, ends):
+    """Say what a user has heard that is not so, or not heard once."""
+    answers = [v for v in known['verdicts'] if v.get('state') in ANSWERS]
+    false = [] if len(answers) == known['sent'] else [f'{answers} for {known["sent"]} goals']
+    if any(known['effort']):
+        false.append(f'an effort of {known["effort"]} after the end')
+    missed = {end['start_time'] for end in ends if end['miss'] >= MISS}
+    for side in ('near', 'far'):
+        for level, message, *start in known[side]:
+            if level == OK and missed.intersection(start):
+                false.append(f'{side}: {message}')
+    return false
+
+
+@pytest.mark.parametrize(('harm', 'count'), [*zip(HARM, (2, 3, 3, 4), strict=True)])
+def test_every_accepted_goal_is_played_or_failed(network, user, harm, count):
+    network.be(*HARM[harm])
+    may_fail = harm == 'loss of 20 %'  # a command of 14 frames: 0.2 ** 5 each
     for _ in range(ATTEMPTS):
         ends = user('goals', count, DURATION)
         played = [end for end in ends if end['miss'] < MISS]
         assert all(end['state'] == 'FAILED' for end in ends if end not in played), ends
-        if len(played) >= count - (loss > 0.1):  # a command of 14 frames: 0.2 ** 5 each
+        if len(played) >= count - may_fail:
             break
-    assert len(played) >= count - (loss > 0.1), ends
+    assert len(played) >= count - may_fail, ends
+    assert not told_truly(user('wait', SETTLED), ends)
+
+
+def test_what_is_late_lost_and_overtaken_at_once_is_played_or_failed(network, user):
+    network.be(0.1, 0.1, 0.2)
+    ends = user('goals', 2, DURATION)
+    assert all(end['state'] == 'FAILED' for end in ends if end['miss'] >= THERE), ends
+    assert not told_truly(user('wait', SETTLED), ends)
 
 
 @pytest.mark.parametrize('delay', [0.1, 0.2])
@@ -124,7 +165,7 @@ def test_a_partition_in_a_motion_ends_neither_it_nor_what_follows(network, user)
 
 def test_a_takeover_into_a_partition_leaves_the_motion_that_it_was_to_replace(network, user):
     """The clock of the plant is behind, too; the second command comes after its end."""
-    network.set_clock_of_plant(-BEHIND)
+    network.set_clock_of_plant(-APART)
     first, second, new = parted(network, user, 0.3, (1.0, 0.8))
     (near,), (far,) = new['near'], new['far']
     assert near[0] == STALE
@@ -133,6 +174,19 @@ def test_a_takeover_into_a_partition_leaves_the_motion_that_it_was_to_replace(ne
     said = [each for each in new['verdicts'] if each.get('plan_id') == second['plan_id']]
     assert said[-1]['message'].endswith('no joint state tells whether the arm is there')
     assert user('goals', 1, DURATION)[0]['state'] == 'FINISHED'
+
+
+def test_an_arm_whose_clock_is_ahead_is_refused_and_rests(network, user):
+    network.be(*NO_HARM)
+    network.set_clock_of_plant(APART)
+    until = monotonic() + TIMEOUT
+    verdict = user('add', 1.0, DURATION)
+    while 'ahead' not in verdict['message'] and monotonic() < until:
+        verdict = user('add', 1.0, DURATION)
+    assert (verdict['error_name'], 'ahead' in verdict['message']) == ('START_STATE_STALE', True)
+    known = user('wait', DURATION)
+    assert known['state'] == pytest.approx([0.0] * 4, abs=1e-6)
+    assert not any(known['effort'])
 
 
 def test_the_profiles_are_added_unless_the_user_has_some(tmp_path, monkeypatch):

@@ -52,6 +52,7 @@ class User(Node):
         """Listen."""
         super().__init__('user')
         self.verdicts, self.state, self.reports = [], None, {'near': [], 'far': []}
+        self.sent = 0
         every = interfaces.LATCHED_HISTORY
         self.create_subscription(DiagnosticArray, '/flat_planner/status', self._on_status, every)
         states = interfaces.SENSOR_DATA
@@ -100,6 +101,7 @@ class User(Node):
         point = JointTrajectoryPoint(positions=[float(angle)])
         point.time_from_start = stamps.duration_msg(duration)
         seen = len(self.verdicts)
+        self.sent += 1
         self.goals.publish(JointTrajectory(joint_names=['joint1'], points=[point]))
 
         def answers():
@@ -125,7 +127,8 @@ class User(Node):
         self.expect(lambda: self.ends(verdict['plan_id']), 'an end')
         self.wait(SETTLING)
         miss = max(abs(self.state.position[0] - angle), abs(self.state.velocity[0]))
-        return {'state': self.ends(verdict['plan_id'])[0], 'miss': miss}
+        state, start = self.ends(verdict['plan_id'])[0], verdict['start_time']
+        return {'state': state, 'miss': miss, 'start_time': start}
 
     def ends(self, plan_id):
         """Return how a motion has ended, nothing before."""
@@ -162,7 +165,9 @@ class User(Node):
             for side, reports in self.reports.items()
         }
         state = [*self.state.position, *self.state.velocity]
-        return {'verdicts': self.verdicts, 'state': state, **heard}
+        effort = list(self.state.effort)[:-1]  # the last is that of a spring
+        known = {'verdicts': self.verdicts, 'sent': self.sent, 'state': state, 'effort': effort}
+        return {**known, **heard}
 
     def on_ask(self, names):
         """Ask the plant for parameters; return how many it has told."""
