@@ -19,7 +19,8 @@ The equation has constant coefficients and only even derivatives, sum_k a_k y^(2
 solutions split into odd and even ones about the middle of the motion and its roots come as +-beta
 (docs/derivation.md, section 5). One root alone gives the paper's exponential, a multiple root an
 exponential times a polynomial, and twelve roots near zero the polynomial law: one mechanism
-without a special case.
+without a special case. A slow motion from rest to rest has its equation solved as a series, which
+needs no roots.
 
 From rest to rest, everything about a law but its size, place and duration follows from the six
 normalised coefficients of its equation ((23)). Unit motions, from -1/2 to 1/2 in normalised time,
@@ -32,21 +33,20 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, UncertifiedPlan
-from flat_planner_ros.core.motion_law.basis import (
-    ALTERNATING,
-    block_of,
-    combined,
-    CONDITIONS,
-    row_factors,
+from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS
+from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
+from flat_planner_ros.core.motion_law.law import (
+    ExponentialLaw,
+    half_quadrature,
+    JET_ORDER,
+    SummedLaw,
 )
-from flat_planner_ros.core.motion_law.law import ExponentialLaw, half_quadrature, JET_ORDER
-from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
+from flat_planner_ros.core.motion_law.roots import Spectrum
+from flat_planner_ros.core.motion_law.slow_law import SLOW, slow_law, speeds
+from flat_planner_ros.core.motion_law.term_sum import TermSum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
-
-RESIDUAL_STEPS = 1
-"""Corrections of the solved boundary conditions by their own residual."""
 
 PROBES = 8
 """Evenly spaced times of half a motion at which a law is certified, besides those near the end."""
@@ -64,9 +64,6 @@ differs for equal numbers of two arms only where such an error crosses a multipl
 
 SAME = 2.0**-49
 """Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
-
-SOLVERS_KEPT = 16
-"""Equations, and parities of their laws, whose conditions' matrices are remembered."""
 
 UNITS_KEPT = 64
 """Unit motions in the cache; the one unused for longest makes room."""
@@ -133,7 +130,7 @@ def extremals(
             if parity > 0.0:
                 target[0] -= middle
             if target.any():
-                terms.extend(_boundary_solver(equation, parity).terms(target))
+                terms.extend(boundary_solver(equation, parity).terms(target))
         laws.append(ExponentialLaw(duration=duration, terms=tuple(terms)))
     return laws
 
@@ -185,49 +182,6 @@ def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
     return value
 
 
-class _BoundarySolver:
-    """Fits the solutions of one parity to derivatives at x = 1; the matrix is inverted once."""
-
-    def __init__(self, found: Sequence[Cluster], parity: float) -> None:
-        """Scale the conditions' matrix and invert it."""
-        ordered = sorted(found, key=lambda cluster: abs(cluster.centre))
-        self._parity = parity
-        self._blocks = [block_of(cluster, parity) for cluster in ordered]
-        columns = [column for block in self._blocks for column in block.columns]
-        self._rows = row_factors([b.growth for b in self._blocks for _ in b.columns])
-        self._matrix = (self._rows * np.array(columns)).T
-        try:
-            self._inverse = np.linalg.inv(self._matrix)
-        except np.linalg.LinAlgError as error:
-            raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
-
-    def terms(self, target: FloatArray) -> list[Term]:
-        """Return the terms of the combination of solutions that meets derivatives 0 to 5."""
-        target = self._rows * target
-        amplitudes = self._inverse @ target
-        for _ in range(RESIDUAL_STEPS):
-            amplitudes += self._inverse @ (target - self._matrix @ amplitudes)
-        terms = []
-        solutions = [block.solutions for block in self._blocks]
-        for term in combined(solutions, amplitudes.tolist()):
-            terms.append(term)
-            if term.origin != 0:  # else it is symmetric by itself
-                terms.append(term.mirrored(self._parity))
-        return terms
-
-
-@lru_cache(maxsize=SOLVERS_KEPT)
-def _boundary_solver(equation: bytes, parity: float) -> _BoundarySolver:
-    """Return the solver of an equation in normalised time, the bytes of its coefficients."""
-    return _BoundarySolver(_clusters(equation), parity)
-
-
-@lru_cache(maxsize=SOLVERS_KEPT)
-def _clusters(equation: bytes) -> Sequence[Cluster]:
-    """Return the clusters of its roots."""
-    return Spectrum(np.frombuffer(equation)).clusters()
-
-
 class Mean(NamedTuple):
     """Means and peaks over a motion, of linear combinations of derivatives."""
 
@@ -246,6 +200,8 @@ class UnitMotion:
         a_0 ... a_6 of its equation, shape (7,).
     law
         From -1/2 at t = 0 to 1/2 at t = 2; odd about the middle.
+    rates
+        Of its exponentials; of a power series how fast it is, shape (m,) [-].
     boundary_residual
         (31) of docs/derivation.md.
     optimality_residual
@@ -258,13 +214,14 @@ class UnitMotion:
     """
 
     coefficients: FloatArray
-    law: ExponentialLaw
+    law: SummedLaw
+    rates: ComplexArray
     boundary_residual: float
     optimality_residual: float
     costate: float
     peaks: FloatArray
 
-    def law_over(self, duration: float, distance: float, middle: float) -> ExponentialLaw:
+    def law_over(self, duration: float, distance: float, middle: float) -> SummedLaw:
         """Return the law in physical time [s] over a distance about a place [rad]."""
         return replace(self.law, duration=duration, factor=distance, offset=middle)
 
@@ -309,7 +266,7 @@ class UnitMotion:
     @cached_property
     def _fine(self) -> tuple[FloatArray, FloatArray]:
         """Return weights and derivatives at the nodes of a quadrature of the first half."""
-        times, weights = half_quadrature(self.law.rates)
+        times, weights = half_quadrature(self.rates)
         return weights, self.jet(times, 2.0 - times)
 
 
@@ -352,14 +309,26 @@ def kept_units(key: bytes) -> list[UnitMotion]:
     return []
 
 
-def unit_terms(coefficients: FloatArray) -> tuple[Term, ...]:
-    """Return the terms of the stationary law from rest at -1/2 to rest at 1/2; it is odd."""
-    return tuple(_BoundarySolver(Spectrum(coefficients).clusters(), -1.0).terms(UNIT_ENDS[:, 1]))
+class UnitLaw(NamedTuple):
+    """A law from rest at -1/2 to rest at 1/2, and its rates as those of a `UnitMotion`."""
+
+    total: TermSum
+    rates: ComplexArray
+
+
+def unit_law(coefficients: FloatArray) -> UnitLaw:
+    """Return the stationary law of an equation over one unit of distance; it is odd."""
+    fastest = float(speeds(coefficients))
+    if fastest <= SLOW:
+        return UnitLaw(slow_law(coefficients, fastest), np.array([complex(fastest)]))
+    solver = BoundarySolver(Spectrum(coefficients).clusters(), -1.0)
+    return UnitLaw(solver.total(UNIT_ENDS[:, 1]), solver.rates)
 
 
 def _certified(coefficients: FloatArray) -> UnitMotion:
     """Return a unit motion with its residuals."""
-    law = ExponentialLaw(duration=2.0, terms=unit_terms(coefficients))
+    total, rates = unit_law(coefficients)
+    law = SummedLaw(duration=2.0, total=total)
     jet = law.normalised_jet(probes(), 2 * CONDITIONS)
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     # Relative to the start, as the value's own peak is the distance.
@@ -369,6 +338,7 @@ def _certified(coefficients: FloatArray) -> UnitMotion:
     return UnitMotion(
         coefficients=coefficients,
         law=law,
+        rates=rates,
         boundary_residual=float(miss.max()),
         optimality_residual=stationarity_residual(coefficients, jet) + SAME,
         costate=float(costate(coefficients, jet[:, -2])),

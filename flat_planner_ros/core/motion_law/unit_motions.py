@@ -27,6 +27,7 @@ from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
 from flat_planner_ros.core.motion_law.extremal import SAME, UNIT_ENDS
 from flat_planner_ros.core.motion_law.law import JET_ORDER
+from flat_planner_ros.core.motion_law.slow_law import speeds
 import numpy as np
 from numpy.typing import NDArray
 
@@ -127,26 +128,6 @@ class Certificates:
     def chosen(self, rows: IntArray) -> 'Certificates':
         """Return those of some motions."""
         return Certificates(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
-
-
-def speeds(coefficients: FloatArray) -> FloatArray:
-    """
-    Return how fast the solutions of equations are, in units of 2 / duration.
-
-    Parameters
-    ----------
-    coefficients
-        a_0 ... a_6 of each, a_6 = 1, shape (p, 7).
-
-    Returns
-    -------
-    FloatArray
-        No root is larger than 2^(1/2) times this (Fujiwara's bound in z = beta^2), shape (p,) [-].
-
-    """
-    exponents = 1.0 / (SOLUTIONS - 2.0 * np.arange(CONDITIONS))
-    largest: FloatArray = (np.abs(coefficients[:, :CONDITIONS]) ** exponents).max(axis=1)
-    return largest
 
 
 def transform_intervals(coefficients: FloatArray, poles: ComplexArray) -> IntArray:

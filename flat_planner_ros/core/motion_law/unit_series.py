@@ -15,27 +15,20 @@
 """
 Unit motions of many equations at once, as Legendre series.
 
-The sixth derivative of a law from rest to rest lacks the polynomials below the sixth, but for
-those of the law of least degree; sixfold integrals of all others vanish at both ends, with five
-derivatives. In this basis the Euler-Lagrange equation is one small linear system, well conditioned
-whatever its roots have in common ((30a) of docs/derivation.md). Roots that are too fast for the
-terms do not pass the certificate, and are left to exponentials.
+They are combinations of the laws of `series_basis`. Roots that are too fast for the terms do not
+pass the certificate, and are left to exponentials.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
-from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
+from flat_planner_ros.core.motion_law.basis import SOLUTIONS
 from flat_planner_ros.core.motion_law.extremal import Mean, probes
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER
-from flat_planner_ros.core.motion_law.legendre_series import (
-    differentiation,
-    integration,
-    legendre_values,
-)
+from flat_planner_ros.core.motion_law.legendre_series import legendre_values
+from flat_planner_ros.core.motion_law.series_basis import series_basis
 from flat_planner_ros.core.motion_law.unit_motions import (
     by_parts,
     Certificates,
@@ -54,66 +47,10 @@ TABLES_KEPT = 32
 """Tables of basis functions at certain places that are remembered."""
 
 
-class _Basis(NamedTuple):
-    """
-    Laws of unit distance: the one of least degree, plus any combination of changes.
-
-    Attributes
-    ----------
-    derivatives
-        Legendre coefficients of the derivatives 0 to 12 of each change and, last, of the law of
-        least degree, shape (13, size, terms + 1).
-    equation
-        Odd coefficients, as many as there are terms, of the even derivatives 0, 2, ..., 12, shape
-        (7, terms, terms + 1).
-
-    """
-
-    derivatives: FloatArray
-    equation: FloatArray
-
-
-@lru_cache(maxsize=TABLES_KEPT)
-def _basis(terms: int) -> _Basis:
-    """Return the basis whose changes have an odd Legendre polynomial each as w^(12)."""
-    size = 2 * terms + SOLUTIONS
-    once, slope = integration(size), differentiation(size)
-    table = np.zeros((SOLUTIONS + 1, size, terms + 1))
-    table[SOLUTIONS, 1 : 2 * terms : 2, :terms] = np.eye(terms)
-    for order in range(SOLUTIONS - 1, CONDITIONS - 1, -1):
-        table[order] = once @ table[order + 1]
-        if order % 2 == 0:
-            table[order, 0] = 0.0  # odd about the middle, wherever the integral began
-    # Only without these polynomials do the next six integrals vanish at both ends.
-    low = np.zeros((size, terms + 1))
-    low[:CONDITIONS] = table[CONDITIONS, :CONDITIONS]
-    for order in range(CONDITIONS, SOLUTIONS):
-        table[order] -= low
-        low = slope @ low
-    for order in range(CONDITIONS - 1, -1, -1):
-        table[order] = once @ table[order + 1]
-        table[order, order % 2 :: 2] = 0.0
-    table[..., terms] = _least_degree(size)
-    return _Basis(locked(table), locked(table[::2, 1 : 2 * terms : 2].copy()))
-
-
-def _least_degree(size: int) -> FloatArray:
-    """Return Legendre coefficients of the polynomial law and its derivatives, (13, size)."""
-    power = np.polynomial.polynomial.polypow([1.0, 0.0, -1.0], CONDITIONS - 1)
-    speed = np.polynomial.legendre.poly2leg(power)
-    table = np.zeros((SOLUTIONS + 1, size))
-    table[1, : len(speed)] = speed / (2.0 * speed[0])
-    for order in range(2, SOLUTIONS + 1):
-        table[order] = differentiation(size) @ table[order - 1]
-    table[0] = integration(size) @ table[1]
-    table[0, 0] = 0.0  # from -1/2
-    return table
-
-
 @lru_cache(maxsize=TABLES_KEPT)
 def _halves(terms: int) -> tuple[FloatArray, FloatArray]:
     """Return derivatives 0, 2, 4, 6 and 1, 3, 5 of the basis, (terms + 1, orders size / 2)."""
-    derivatives = _basis(terms).derivatives[: JET_ORDER + 1]
+    derivatives = series_basis(terms).derivatives[: JET_ORDER + 1]
     # Those of even order are odd about the middle.
     odd, even = derivatives[::2, 1::2], derivatives[1::2, ::2]
     return _in_columns(odd), _in_columns(even)
@@ -129,7 +66,7 @@ def _at_probes(terms: int) -> FloatArray:
     """Return derivatives 0 to 12 of the basis at the times of the certificate."""
     after_start, before_end = probes()
     places = np.where(after_start < 1.0, after_start - 1.0, 1.0 - before_end)
-    derivatives = _basis(terms).derivatives
+    derivatives = series_basis(terms).derivatives
     values = legendre_values(places, derivatives.shape[1])
     table = np.einsum('kst,sm->tkm', derivatives, values)
     return locked(table.reshape(terms + 1, -1))
@@ -153,7 +90,7 @@ def _on_grid(terms: int, intervals: int) -> tuple[FloatArray, FloatArray]:
 def _velocities(terms: int, intervals: int) -> FloatArray:
     """Return w' of the basis at x = 0, h, ..., 1, shape (terms + 1, intervals + 1)."""
     values = legendre_values(np.linspace(0.0, 1.0, intervals + 1), 2 * terms + SOLUTIONS)
-    return locked(_basis(terms).derivatives[1].T @ values)
+    return locked(series_basis(terms).derivatives[1].T @ values)
 
 
 def _parities(places: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
@@ -197,7 +134,7 @@ class UnitSeries:
             An equation is singular in double precision.
 
         """
-        system = np.einsum('pk,kij->pij', coefficients, _basis(terms).equation)
+        system = np.einsum('pk,kij->pij', coefficients, series_basis(terms).equation)
         changes = np.linalg.solve(system[..., :terms], -system[..., terms:])[..., 0]
         amplitudes = np.concatenate([changes, np.ones((len(changes), 1))], axis=1)
         jets = (amplitudes @ _at_probes(terms)).reshape(len(changes), SOLUTIONS + 1, -1)

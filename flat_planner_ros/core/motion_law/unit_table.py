@@ -20,8 +20,9 @@ from typing import NamedTuple, Protocol
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.extremal import Mean
 from flat_planner_ros.core.motion_law.simple_roots import simple_roots, SimpleRoots
+from flat_planner_ros.core.motion_law.slow_law import speeds
 from flat_planner_ros.core.motion_law.unit_exponentials import UnitExponentials
-from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, Nodes, speeds
+from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, Nodes
 from flat_planner_ros.core.motion_law.unit_series import FASTEST, UnitSeries
 import numpy as np
 

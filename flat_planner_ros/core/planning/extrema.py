@@ -183,7 +183,7 @@ def extrema_of(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> 
 
 def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     """Return series of all joints' quantities, in the order of quantities and joints."""
-    bounds, orders = _first_bounds(plan.trajectory, plan.problem.unit.law.rates)
+    bounds, orders = _first_bounds(plan.trajectory, plan.problem.unit.rates)
     starts, lengths = bounds[:-1], np.diff(bounds)
     scale, layer_scale = _Range(), _Range()
     done: list[tuple[FloatArray, FloatArray, FloatArray, BoolArray]] = []

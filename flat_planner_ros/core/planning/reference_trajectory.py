@@ -336,7 +336,7 @@ class RestToRestTrajectory:
     def nodes(self) -> MotionNodes:
         """Return the motion at the nodes of a quadrature that resolves it."""
         travel = sum(abs(distance) for distance in self.distances)
-        times, weights = motion_quadrature(self.problem.unit.law.rates, travel, self.edges)
+        times, weights = motion_quadrature(self.problem.unit.rates, travel, self.edges)
         return MotionNodes(times, weights, self.jets(times))
 
 
@@ -423,4 +423,4 @@ class LawTrajectory:
         if len(self.edges) > 2:
             places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
         travel = float(np.abs(np.diff(places)).sum())
-        return motion_quadrature(self.problem.unit.law.rates, travel, self.edges)
+        return motion_quadrature(self.problem.unit.rates, travel, self.edges)

@@ -16,13 +16,19 @@
 
 from flat_planner_ros.core.arm.flat_map import flat_map, FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
+from flat_planner_ros.core.motion_law.boundary_solver import BoundarySolver
 from flat_planner_ros.core.motion_law.cost import QuadraticCost, Strategy, strategy_cost
 from flat_planner_ros.core.motion_law.extremal import (
     BoundaryConditions,
     costate,
     extremals,
     stationarity_residual,
+    UNIT_ENDS,
+    unit_motion,
 )
+from flat_planner_ros.core.motion_law.roots import Spectrum
+from flat_planner_ros.core.motion_law.slow_law import SLOW, speeds
+from flat_planner_ros.core.motion_law.term_sum import term_sum
 import numpy as np
 from numpy.polynomial import legendre, Polynomial
 import pytest
@@ -395,3 +401,43 @@ def test_polynomial_cost_gives_the_polynomial_of_degree_eleven():
     )
     assert relative_error(law.jet(times, 6), expected) <= 1e-13
     np.testing.assert_allclose(law.jet(times, 12)[12], 0.0)
+
+
+def equation_of_speed(rng, speed):
+    """Return a random equation whose solutions are as fast, some of its roots zero or double."""
+    rows = rng.normal(size=(int(rng.integers(1, 4)), 6))
+    rows[:, : int(rng.integers(0, 5))] = 0.0
+    rows[:, 5] /= np.linalg.norm(rows[:, 5])
+    matrix = rows.T @ rows
+    matrix[5, 5] = 1.0
+    equation = QuadraticCost(matrix=matrix).characteristic()
+    return equation * (speed / float(speeds(equation))) ** np.arange(12.0, -1.0, -2.0)
+
+
+@pytest.mark.parametrize('speed', [0.01, 0.3, 1.0, 2.4, 2.6, 5.0, 8.9])
+def test_a_slow_motion_is_the_same_as_a_series_and_by_its_roots(speed):
+    """Neither form knows of the other: one solves for Legendre coefficients, one has clusters."""
+    rng = np.random.default_rng(int(100 * speed))
+    places = np.array([FRACTIONS, 1.0 - FRACTIONS]) * 2.0
+    for _ in range(cases(40)):
+        equation = equation_of_speed(rng, speed)
+        assert float(speeds(equation)) == pytest.approx(speed)
+        found = unit_motion(equation)
+        assert not len(found.law.total.decays)
+        by_roots = BoundarySolver(Spectrum(equation).clusters(), -1.0).total(UNIT_ENDS[:, 1])
+        expected = by_roots.at(places, 6)
+        error = np.abs(found.law.normalised_jet(places, 6) - expected).max(axis=1)
+        assert (error <= 1e-10 * np.abs(expected).max(axis=1)).all()
+        assert found.optimality_residual <= 1e-12
+        assert found.boundary_residual <= 1e-11
+
+
+def test_a_sum_of_exponentials_is_that_of_their_terms():
+    rng = np.random.default_rng(8)
+    places = np.array([FRACTIONS, 1.0 - FRACTIONS]) * 2.0
+    for _ in range(20):
+        equation = equation_of_speed(rng, rng.uniform(SLOW, 60.0))
+        solver = BoundarySolver(Spectrum(equation).clusters(), -1.0)
+        total = solver.total(UNIT_ENDS[:, 1])
+        expected = term_sum(solver.terms(UNIT_ENDS[:, 1]))
+        np.testing.assert_array_equal(total.at(places, 12), expected.at(places, 12))

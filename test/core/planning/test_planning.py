@@ -260,7 +260,7 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, const
 @pytest.mark.parametrize('damage', ['end', 'middle'])
 def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
     """A law for other ends misses the boundary, one for another cost the optimality."""
-    compute = extremals.unit_terms
+    compute = extremals.unit_law
     # A problem that no other test has: nothing of it is in the cache.
     arm = paper_arm_with(2e-5)
 
@@ -269,9 +269,10 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
             return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1])
         end = 0.5 * np.eye(6)[0]
         ends = BoundaryConditions(start=-end, end=end * (1.0 + 1e-8))
-        return extremals.extremals(coefficients, 2.0, [ends])[0].terms
+        total = extremals.extremals(coefficients, 2.0, [ends])[0].total
+        return extremals.UnitLaw(total, compute(coefficients).rates)
 
-    monkeypatch.setattr(extremals, 'unit_terms', wrong)
+    monkeypatch.setattr(extremals, 'unit_law', wrong)
     extremals.kept_units.cache_clear()
     request.addfinalizer(extremals.kept_units.cache_clear)
     quantity = {'end': 'boundary', 'middle': 'optimality'}[damage]

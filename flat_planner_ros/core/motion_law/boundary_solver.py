@@ -1,0 +1,113 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Solutions of an equation, one parity at a time, fitted to derivatives at the end."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, UncertifiedPlan
+from flat_planner_ros.core.motion_law.basis import block_of, combined, row_factors
+from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
+from flat_planner_ros.core.motion_law.term_sum import plain_factors, term_sum, TermSum
+from flat_planner_ros.core.motion_law.terms import Term
+import numpy as np
+
+RESIDUAL_STEPS = 1
+"""Corrections of the solved boundary conditions by their own residual."""
+
+SOLVERS_KEPT = 16
+"""Equations, and parities of their laws, whose conditions' matrices are remembered."""
+
+
+class BoundarySolver:
+    """
+    Fits the solutions of one parity to derivatives at x = 1; the matrix is inverted once.
+
+    Parameters
+    ----------
+    found
+        Clusters of the equation's roots.
+    parity
+        1 for the even solutions, -1 for the odd ones.
+
+    Raises
+    ------
+    UncertifiedPlan
+        The conditions are singular in double precision.
+
+    """
+
+    def __init__(self, found: Sequence[Cluster], parity: float) -> None:
+        """Scale the conditions' matrix and invert it."""
+        ordered = sorted(found, key=lambda cluster: abs(cluster.centre))
+        blocks = [block_of(cluster, parity) for cluster in ordered]
+        columns = [column for block in blocks for column in block.columns]
+        self._parity = parity
+        self._solutions = [block.solutions for block in blocks]
+        self._rows = row_factors([b.growth for b in blocks for _ in b.columns])
+        self._matrix = (self._rows * np.array(columns)).T
+        try:
+            self._inverse = np.linalg.inv(self._matrix)
+        except np.linalg.LinAlgError as error:
+            raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
+
+    @property
+    def rates(self) -> ComplexArray:
+        """Return the rates of the solutions, without mirror images, shape (m,) [-]."""
+        return np.array([solutions.rate for solutions in self._solutions])
+
+    def terms(self, target: FloatArray) -> list[Term]:
+        """Return the terms of the combination of solutions that meets derivatives 0 to 5."""
+        terms = []
+        for term in combined(self._solutions, self._amplitudes(target).tolist()):
+            terms.append(term)
+            if term.origin != 0:  # else it is symmetric by itself
+                terms.append(term.mirrored(self._parity))
+        return terms
+
+    def total(self, target: FloatArray) -> TermSum:
+        """Return the sum of these terms, ready for evaluation."""
+        around_zero, *others = self._solutions
+        if around_zero.series is None or any(each.series is not None for each in others):
+            return term_sum(self.terms(target))
+        # No roots but zero have company: exponentials, with a mirror image each, and powers.
+        amplitudes = self._amplitudes(target)
+        count = around_zero.size
+        exponentials = combined(others, amplitudes[count:].tolist())
+        at_end = np.array([term.coefficients for term in exponentials], dtype=complex)
+        decays = np.array([term.rate for term in exponentials], dtype=complex)
+        series = amplitudes[:count] @ around_zero.series.real
+        factors = plain_factors(decays, at_end.reshape(-1, 1) * [self._parity, 1.0], series)
+        return TermSum(decays=decays, factors=factors, others=())
+
+    def _amplitudes(self, target: FloatArray) -> FloatArray:
+        """Return the factors of the solutions that meet derivatives 0 to 5."""
+        target = self._rows * target
+        amplitudes: FloatArray = self._inverse @ target
+        for _ in range(RESIDUAL_STEPS):
+            amplitudes += self._inverse @ (target - self._matrix @ amplitudes)
+        return amplitudes
+
+
+@lru_cache(maxsize=SOLVERS_KEPT)
+def boundary_solver(equation: bytes, parity: float) -> BoundarySolver:
+    """Return the solver of an equation in normalised time, the bytes of its coefficients."""
+    return BoundarySolver(_clusters(equation), parity)
+
+
+@lru_cache(maxsize=SOLVERS_KEPT)
+def _clusters(equation: bytes) -> Sequence[Cluster]:
+    """Return the clusters of its roots."""
+    return Spectrum(np.frombuffer(equation)).clusters()
