@@ -40,7 +40,7 @@ from flat_planner_ros.core.motion_law.unit_motions import (
 )
 import numpy as np
 
-FASTEST = {16: 10.0, 24: 20.0, 32: 28.0}
+FASTEST = {0: 0.0, 10: 3.0, 16: 10.0, 24: 20.0, 32: 28.0}
 """Fastest root in units of 2 / duration for each number of odd terms of w^(12) [-]."""
 
 TABLES_KEPT = 32
