@@ -31,12 +31,12 @@ from flat_planner_ros.core.motion_law.extremal import (
     UnitMotion,
 )
 from flat_planner_ros.core.motion_law.law import (
-    ExponentialLaw,
     JET_ORDER,
     Law,
     MAX_DERIVATIVE,
     motion_quadrature,
     ScaledLaw,
+    SummedLaw,
 )
 from flat_planner_ros.core.motion_law.legendre_series import differentiation, integration
 from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
@@ -48,7 +48,6 @@ __all__ = [
     'CONDITIONS',
     'costate',
     'differentiation',
-    'ExponentialLaw',
     'extremals',
     'integration',
     'JET_ORDER',
@@ -65,6 +64,7 @@ __all__ = [
     'stationarity_residual',
     'Strategy',
     'strategy_cost',
+    'SummedLaw',
     'unit_motion',
     'UnitMotion',
     'unit_table',

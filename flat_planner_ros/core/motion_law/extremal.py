@@ -36,15 +36,10 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS
 from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
-from flat_planner_ros.core.motion_law.law import (
-    ExponentialLaw,
-    half_quadrature,
-    JET_ORDER,
-    SummedLaw,
-)
+from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, SummedLaw
 from flat_planner_ros.core.motion_law.roots import Spectrum
 from flat_planner_ros.core.motion_law.slow_law import SLOW, slow_law, speeds
-from flat_planner_ros.core.motion_law.term_sum import TermSum
+from flat_planner_ros.core.motion_law.term_sum import term_sum, TermSum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
 
@@ -92,7 +87,7 @@ class BoundaryConditions:
 
 def extremals(
     coefficients: FloatArray, duration: float, conditions: Sequence[BoundaryConditions]
-) -> list[ExponentialLaw]:
+) -> list[SummedLaw]:
     """
     Return the stationary laws of one equation that meet boundary conditions, one for each.
 
@@ -131,7 +126,7 @@ def extremals(
                 target[0] -= middle
             if target.any():
                 terms.extend(boundary_solver(equation, parity).terms(target))
-        laws.append(ExponentialLaw(duration=duration, terms=tuple(terms)))
+        laws.append(SummedLaw(duration=duration, total=term_sum(terms)))
     return laws
 
 

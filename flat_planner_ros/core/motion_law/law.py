@@ -23,14 +23,13 @@ boundary layers and oscillations of exponentials.
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 from math import ceil, log2
 from typing import Protocol, Self
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
-from flat_planner_ros.core.motion_law.term_sum import term_sum, TermSum
-from flat_planner_ros.core.motion_law.terms import Term, TOP_ORDER
+from flat_planner_ros.core.motion_law.term_sum import TermSum
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -138,39 +137,9 @@ class ScaledLaw(ABC):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ExponentialLaw(ScaledLaw):
-    """
-    A sum of exponentials times polynomials, infinitely smooth.
-
-    Attributes
-    ----------
-    terms
-        Their sum, scaled and shifted, is the value [rad].
-
-    """
-
-    terms: tuple[Term, ...]
-
-    def normalised_jet(self, distances: FloatArray, order: int) -> FloatArray:
-        """Return the sum of the terms and its derivatives, as `ScaledLaw.normalised_jet`."""
-        total = self.total if order <= TOP_ORDER else term_sum(self.terms, order)
-        return total.at(distances, order)
-
-    @cached_property
-    def total(self) -> TermSum:
-        """Sum of the terms, ready for evaluation in normalised time."""
-        return term_sum(self.terms)
-
-    @property
-    def rates(self) -> ComplexArray:
-        """Characteristic roots of the terms in units of 2 / duration, shape (m,) [-]."""
-        return np.array([term.rate for term in self.terms])
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class SummedLaw(ScaledLaw):
     """
-    A sum of terms that is ready for evaluation, up to the order `TOP_ORDER`.
+    A sum of exponentials times polynomials, infinitely smooth; up to the order `TOP_ORDER`.
 
     Attributes
     ----------

@@ -173,23 +173,24 @@ def by_parts(certificates: Certificates, poles: ComplexArray) -> ComplexArray:
 
     """
     inverse = 1.0 / poles
-    square = inverse**2
-    start = np.exp(2.0 * poles)
-    a = certificates.coefficients
+    square = inverse * inverse
+    coefficients, ends = certificates.coefficients, certificates.ends
     # sum_k a_k z^(2k - 12), from the lowest that meets a boundary term on.
     sums = [np.ones_like(poles)]
-    power = np.ones_like(poles)
+    power = square
     for k in range(CONDITIONS - 1, 0, -1):
+        column = coefficients[:, k : k + 1]
+        sums.append(sums[-1] + column * power if column.any() else sums[-1])
         power = power * square
-        sums.append(sums[-1] + a[:, k : k + 1] * power)
-    total = np.zeros_like(poles)
-    power = inverse**CONDITIONS
-    for index in range(CONDITIONS):
-        order = CONDITIONS + index
-        left = certificates.ends[:, index : index + 1] * (1.0 + (-1.0) ** order * start)
-        total -= left * power * sums[(SOLUTIONS - 1 - order) // 2]
-        power = power * inverse
-    result: ComplexArray = total / sums[-1]
+    # Of even order the terms of start and end add up, of odd order they are subtracted.
+    even, odd = (sums[0] * ends[:, order, None] for order in (-2, -1))
+    for order in range(CONDITIONS - 4, -1, -2):
+        left = sums[CONDITIONS // 2 - 1 - order // 2]
+        even = ends[:, order, None] * left + square * even
+        odd = ends[:, order + 1, None] * left + square * odd
+    odd = inverse * odd
+    result: ComplexArray = even + odd + np.exp(2.0 * poles) * (even - odd)
+    result *= -square * square * square / sums[-1]
     return result
 
 

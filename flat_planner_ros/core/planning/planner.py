@@ -28,7 +28,6 @@ from flat_planner_ros.core.arm import (
 from flat_planner_ros.core.motion_law import (
     BoundaryConditions,
     CONDITIONS,
-    ExponentialLaw,
     extremals,
     Law,
     MAX_DERIVATIVE,
@@ -36,6 +35,7 @@ from flat_planner_ros.core.motion_law import (
     PathConditions,
     probes,
     stationarity_residual,
+    SummedLaw,
 )
 from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Plan
 from flat_planner_ros.core.planning.reference_trajectory import (
@@ -217,9 +217,7 @@ def _own_from_motion(
     return own.motion_from(problem.arm, options, problem.duration, start, final)
 
 
-def _residuals(
-    problem: MotionProblem, law: ExponentialLaw, way: FloatArray
-) -> tuple[float, float]:
+def _residuals(problem: MotionProblem, law: SummedLaw, way: FloatArray) -> tuple[float, float]:
     """Return boundary and Euler-Lagrange residual of a law from given derivatives to zero."""
     powers = (0.5 * problem.duration) ** np.arange(CONDITIONS + 1.0)
     near = probes()[0, :-1]
