@@ -28,6 +28,7 @@ from pathlib import Path
 import traceback
 from typing import Any
 
+from flat_planner_ros.ros.nodes.all_or_nothing import AllOrNothing
 from flat_planner_ros.ros.nodes.node_log import NodeLog
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
@@ -37,7 +38,7 @@ LIBRARY = 'rclpy.'
 """Begin of the names of the modules whose callbacks are not ours."""
 
 
-class GuardedNode(Node):
+class GuardedNode(Node, metaclass=AllOrNothing):
     """A node that no message, no request and no error in a callback ends, nor a full console."""
 
     def __init__(self, name: str, **options: Any) -> None:

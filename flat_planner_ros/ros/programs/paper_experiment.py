@@ -33,9 +33,12 @@ from flat_planner_ros.figures.paper_example import (
 )
 from flat_planner_ros.ros.nodes.node_runner import new_executor
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
+from flat_planner_ros.ros.programs.paper_company import has_company, OURS
 from flat_planner_ros.ros.programs.played_motion import (
     ExperimentFailed,
+    Interrupted,
     is_played,
+    NotFound,
     of_joint_1,
     recording,
     TooBusy,
@@ -44,7 +47,6 @@ from flat_planner_ros.ros.wire import conversions, interfaces, stamps
 from flat_planner_ros.ros.wire.verdict_text import values_of
 import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
-import rclpy
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -57,11 +59,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 LEAD = 0.3
 """Time from sending a goal to the start of its motion, in real time [s]."""
 
-DISCOVERY = 3.0
-"""Time given to nodes that already run to be discovered [s]."""
-
 PATIENCE = 60.0
 """Real time that a step of the experiment may take [s]."""
+
+FOUND_WITHIN = 20.0
+"""Real time in which nodes that have just been started find each other [s]."""
 
 REPORT_PATIENCE = 20.0
 """Real time that a motion and its report may take [s]."""
@@ -84,13 +86,6 @@ PAUSE = 0.1
 
 RECORDING = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 """Quality of service for the joint states of one run: none is lost while this process is busy."""
-
-OURS = (interfaces.PLANNER, interfaces.PLANT, interfaces.MONITOR)
-"""The nodes that take part in each run."""
-
-
-class Interrupted(Exception):
-    """SIGINT or SIGTERM has come."""
 
 
 class NotPlayed(Exception):
@@ -170,34 +165,48 @@ class Experimenter(Node):
         super().destroy_node()
 
     def wait_for_nodes(self) -> None:
-        """Wait until all nodes answer and hear each other."""
-        planner, _, monitor = OURS
-        command = interfaces.topic_of(planner, interfaces.COMMAND)
-        plan = interfaces.topic_of(planner, interfaces.PLAN)
+        """
+        Wait until all nodes answer and hear each other.
 
-        def are_listening() -> bool:
-            listeners = [
-                *self.get_subscriptions_info_by_topic(self.resolve_topic_name(command)),
-                *self.get_subscriptions_info_by_topic(self.resolve_topic_name(plan)),
-                *self.get_subscriptions_info_by_topic(
-                    self.resolve_topic_name(interfaces.JOINT_STATES)
-                ),
-            ]
-            names = [info.node_name for info in listeners]
-            return {self.commanded, monitor, planner} <= set(names) and names.count(monitor) > 1
+        Raises
+        ------
+        NotFound
+            They do not within `FOUND_WITHIN`.
 
-        self._await(
-            lambda: (
-                all(client.service_is_ready() for client in self._setters.values())
-                and all(self.get_node_names().count(name) == 1 for name in self.nodes)
-                and self._reset.service_is_ready()
-                and self._adopt.service_is_ready()
-                and self._goals.get_subscription_count() > 0
-                and bool(self._states)
-                and are_listening()
-            ),
-            'the nodes do not find each other',
+        """
+        if not self._spin_until(lambda: not self._missing(), FOUND_WITHIN):
+            raise NotFound(f'within {FOUND_WITHIN:g} s: {", ".join(self._missing())}')
+
+    def _missing(self) -> list[str]:
+        """Return what keeps the nodes from working together, in words."""
+        present = self.get_node_names()
+        count = {name: present.count(name) for name in self.nodes}
+        ready = {name: client.service_is_ready() for name, client in self._setters.items()}
+        planner, plant, monitor = OURS
+        listeners = (
+            (interfaces.topic_of(planner, interfaces.COMMAND), self.commanded),
+            (interfaces.topic_of(planner, interfaces.PLAN), monitor),
+            (interfaces.JOINT_STATES, planner),
+            (interfaces.JOINT_STATES, monitor),
         )
+        return [
+            *(f'{name} is there {number} times' for name, number in count.items() if number != 1),
+            *(f'{name} has no parameters' for name, is_ready in ready.items() if not is_ready),
+            *(
+                f'{name} does not hear {topic}'
+                for topic, name in listeners
+                if name not in self._listening_to(topic)
+            ),
+            *([] if self._reset.service_is_ready() else [f'{plant} has no service to reset it']),
+            *([] if self._adopt.service_is_ready() else [f'{planner} has no service to adopt']),
+            *([] if self._goals.get_subscription_count() else ['nobody hears goals']),
+            *([] if self._states else ['no joint states']),
+        ]
+
+    def _listening_to(self, topic: str) -> list[str]:
+        """Return the names of the nodes that subscribe to a topic."""
+        infos = self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))
+        return [info.node_name for info in infos]
 
     def run(self, scenario: Scenario, method: Method) -> Result:
         """
@@ -213,7 +222,7 @@ class Experimenter(Node):
         """
         self._configure(scenario, method)
         if company := [name for name in self.nodes if self.get_node_names().count(name) > 1]:
-            raise ExperimentFailed(_complaint(company))
+            raise has_company(company)
         if method.learns:
             self._played(scenario, method)
             self._learn()
@@ -349,40 +358,6 @@ class Experimenter(Node):
                 return False
             self._spinner.spin_once(timeout_sec=0.1)
         return True
-
-
-def refuse_company(interrupted: Event) -> None:
-    """
-    Make sure that none of our nodes is running: a goal would reach both.
-
-    Raises
-    ------
-    ExperimentFailed
-        One of our nodes is running.
-    Interrupted
-        If the event is set meanwhile.
-
-    """
-    node = Node('paper_table_probe')
-    deadline = monotonic() + DISCOVERY
-    try:
-        while monotonic() < deadline:
-            if interrupted.is_set():
-                raise Interrupted
-            rclpy.spin_once(node, timeout_sec=0.1)
-            present = sorted({*OURS, interfaces.TRACKER} & set(node.get_node_names()))
-            if present:
-                raise ExperimentFailed(_complaint(present))
-    finally:
-        node.destroy_node()
-
-
-def _complaint(names: Sequence[str]) -> str:
-    """Return what to do about nodes that were there before."""
-    return (
-        f'{", ".join(names)} already runs here: stop it, or choose another ROS_DOMAIN_ID for the '
-        f'experiment'
-    )
 
 
 def _goal(start: float) -> JointTrajectory:

@@ -49,17 +49,19 @@ from flat_planner_ros.ros.programs.outputs import (
     summary_stream,
     write_through,
 )
-from flat_planner_ros.ros.programs.paper_experiment import (
-    Experimenter,
-    Interrupted,
-    refuse_company,
-)
+from flat_planner_ros.ros.programs.paper_company import refuse_company
+from flat_planner_ros.ros.programs.paper_experiment import Experimenter
 from flat_planner_ros.ros.programs.paper_nodes import (
     node_processes,
     planned_nodes,
     tracked_nodes,
 )
-from flat_planner_ros.ros.programs.played_motion import ExperimentFailed, TooBusy
+from flat_planner_ros.ros.programs.played_motion import (
+    ExperimentFailed,
+    Interrupted,
+    NotFound,
+    TooBusy,
+)
 from flat_planner_ros.ros.programs.progress import progress
 from flat_planner_ros.ros.programs.tracked_experiment import TrackedExperimenter
 import rclpy
@@ -74,6 +76,9 @@ TRACKED_SPEED = 0.5
 
 SLOWER, SLOWEST = 0.4, 0.1
 """What a machine that does not keep up is given: speeds of that ratio, down to about the least."""
+
+STARTS = 3
+"""How often nodes are started, in all, that do not find each other."""
 
 SHOWN_AS_DECIMAL = 1e-4
 """Amplitude from which the table shows decimals rather than an exponent [rad]."""
@@ -244,6 +249,7 @@ def _results(
 ) -> list[Result]:
     """Return the rows, printed as they come."""
     results: list[Result] = []
+    starts = STARTS
     print('starting the nodes ...', flush=True)
     with progress(len(cases), 'paper_table') as advance:
         for (is_tracked, *_), group in groupby(cases, _setup):
@@ -258,6 +264,11 @@ def _results(
                         results.append(result)
                         del rows[0]
                         advance(1)
+                except NotFound as reason:
+                    starts -= 1
+                    if not starts:
+                        raise
+                    print(f'{reason}; the nodes are started again', file=sys.stderr)
                 except TooBusy as reason:
                     if speed == 1.0 or pace < SLOWEST:
                         raise

@@ -36,6 +36,14 @@ class ExperimentFailed(Exception):
     """The experiment cannot go on; the message says why."""
 
 
+class NotFound(ExperimentFailed):
+    """Nodes do not find each other; the message says what is missing."""
+
+
+class Interrupted(Exception):
+    """SIGINT or SIGTERM has come."""
+
+
 class TooBusy(ExperimentFailed):
     """The machine does not keep up."""
 

@@ -18,7 +18,8 @@ from typing import Any
 
 from flat_planner_ros.core.monitor import PlannedMotion
 from flat_planner_ros.figures.paper_example import DURATION, Recording, SEEN
-from flat_planner_ros.ros.programs.paper_experiment import Experimenter, NotPlayed, OURS
+from flat_planner_ros.ros.programs.paper_company import OURS
+from flat_planner_ros.ros.programs.paper_experiment import Experimenter, NotPlayed
 from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 from std_srvs.srv import Trigger

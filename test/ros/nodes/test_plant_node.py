@@ -601,6 +601,14 @@ def test_settings_that_contradict_themselves_are_refused(graph, name):
         graph.create(PlantNode, parameters)
 
 
+def test_a_node_that_is_refused_is_not_in_the_graph(graph):
+    with pytest.raises(FlatPlannerError) as caught:  # which keeps the half-made node
+        graph.create(PlantNode, {'input_timeout': 0.0})
+    assert caught.traceback
+    graph.expect(lambda: graph.probe.get_node_names() == ['probe'], 'the probe alone')
+    assert not graph.probe.count_publishers('joint_states')
+
+
 def test_changes_that_make_no_sense_are_refused_with_a_reason(plant, graph):
     for name, value, text in (
         ('mismatch.stiffness_scale', -1.0, ''),
