@@ -63,7 +63,7 @@ def test_a_planner_restarted_in_a_motion_waits_for_its_end(graph):
         if abs(world.states[-1].velocity[0]) < 0.15:
             raise Late('the restart took all of the motion')
         assert verdict['error_name'] == 'NOT_AT_REST'
-        world.wait_until(world.end + 1.2)  # once a second the plant says what it has skipped
+        world.wait_until(world.end + 2.2)  # once a second the plant says what it has skipped
         return world.states[-1].position[0]
 
     assert world.in_time(move_and_restart) == pytest.approx(2.0, abs=1e-3)
