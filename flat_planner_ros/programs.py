@@ -81,9 +81,6 @@ def tradeoff() -> int:
 
 def study() -> int:
     """Do the rows of a study."""
-    # A process does one row after the other: more threads would only wait for each other.
-    for variable in THREADS:
-        os.environ.setdefault(variable, '1')
     return _run_tool('study.program')
 
 
@@ -128,6 +125,9 @@ def _run(module: str, interrupted: int = 0) -> int:
 
     for number in SIGNALS:
         signal.signal(number, leave)
+    # Matrices are small here: more threads would only wait for each other.
+    for variable in THREADS:
+        os.environ.setdefault(variable, '1')
     try:
         # A module with nodes catches signals by itself from here on, while they exist.
         return int(import_module(f'flat_planner_ros.ros.{module}').main())

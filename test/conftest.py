@@ -18,6 +18,7 @@ from importlib import import_module
 import os
 from pathlib import Path
 
+from flat_planner_ros.programs import THREADS
 from hypothesis import settings
 import pytest
 
@@ -44,6 +45,10 @@ settings.load_profile('ci' if os.environ.get('CI') else 'local')
 # Before any message class is imported, and inherited by the nodes that the tests start.
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+# Before linear algebra is loaded, as programs do: more threads would wait for each other.
+for variable in THREADS:
+    os.environ.setdefault(variable, '1')
 
 try:
     import_module('rclpy')

@@ -194,6 +194,18 @@ class SampledMotion:
         n = self._rest.size
         return both[:n], both[n:]
 
+    def through(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what `at` does for each of many times (k,) [s], shape (k, n) each."""
+        after, points = np.searchsorted(self._times, times, side='right'), len(self._times)
+        n, inside = self._rest.size, (after > 0) & (after < points)
+        before = after[inside] - 1
+        u = (times[inside] - np.array(self._times)[before])[:, None]
+        a, b, c, d = np.moveaxis(self._coefficients[before], 1, 0)
+        both = np.zeros((len(times), 2 * n))
+        both[after == 0, :n], both[after == points, :n] = self._ends
+        both[inside] = ((a * u + b) * u + c) * u + d
+        return both[:, :n], both[:, n:]
+
     def acceleration_at(self, time: float) -> FloatArray:
         """Return the acceleration, which may jump at the points, shape (n,) [rad/s^2]."""
         after = bisect_right(self._times, time)

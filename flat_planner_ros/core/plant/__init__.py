@@ -16,7 +16,12 @@
 
 from flat_planner_ros.core.plant.drives import DriveSettings
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
-from flat_planner_ros.core.plant.exact_steps import CommandTable, exact_ends, States
+from flat_planner_ros.core.plant.exact_steps import (
+    CommandTable,
+    exact_ends,
+    held_steps,
+    States,
+)
 from flat_planner_ros.core.plant.many_arms import integrated_ends
 from flat_planner_ros.core.plant.paced_arm import PacedArm
 from flat_planner_ros.core.plant.rollout import rollout
@@ -30,6 +35,7 @@ __all__ = [
     'DriveSettings',
     'EffortProfile',
     'exact_ends',
+    'held_steps',
     'integrated_ends',
     'PacedArm',
     'rollout',

@@ -160,6 +160,28 @@ def exact_ends(
     return States(ends[:2].T, ends[2:].T)
 
 
+def held_steps(arms: ArmStack, time: float) -> tuple[FloatArray, FloatArray]:
+    """
+    Return what a time with a constant effort does to linear two-joint arms.
+
+    Parameters
+    ----------
+    arms
+        What is moved; `is_linear`.
+    time
+        How long [s].
+
+    Returns
+    -------
+    tuple
+        What becomes of states, q_1, q_2 and their rates, shape (4, 4, m), and what one N m of
+        joint 1 adds, (4, m).
+
+    """
+    transition, (effect,) = _steps(_driven_by_efforts(arms), np.full(len(arms), time), 1)
+    return transition, effect
+
+
 def _driven_by_efforts(arms: ArmStack) -> _Linear:
     """Return the rows for the effort of joint 1, from the arms' own equations of motion."""
     count = len(arms)

@@ -165,12 +165,23 @@ def _played(case: Case, commands: CommandTable, row: int, step: float) -> States
 
 def _check(case: Case, commands: CommandTable, row: int, ends: States) -> None:
     """Compare an end with the plant's own."""
-    held = case.true.stiffness / case.true.inertia[-1, -1]
-    last, both = case.true.inertia[-1, -1], case.true.inertia[-2:, -2:].trace()
-    fastest = float(np.sqrt(held * max(1.0, both / (both - last))))
-    again = _played(case, commands, row, min(case.step, TURN_PER_STEP / fastest))
-    angles = float(np.abs(again.positions[0] - ends.positions[row]).max())
-    rates = float(np.abs(again.velocities[0] - ends.velocities[row]).max())
+    again = _played(case, commands, row, min(case.step, TURN_PER_STEP / _fastest(case)))
+    check_end(case, again, States(ends.positions[row : row + 1], ends.velocities[row : row + 1]))
+
+
+def check_end(case: Case, again: States, end: States) -> None:
+    """
+    Compare an end of a motion with the plant's own.
+
+    Raises
+    ------
+    PlantDisagrees
+        They differ.
+
+    """
+    fastest = _fastest(case)
+    angles = float(np.abs(again.positions - end.positions).max())
+    rates = float(np.abs(again.velocities - end.velocities).max())
     way = float(np.abs(np.subtract(case.final, case.start)).max())
     difference, allowed = max(angles, rates / fastest), AGREEMENT * way
     if difference > allowed:
@@ -180,6 +191,13 @@ def _check(case: Case, commands: CommandTable, row: int, ends: States) -> None:
             f'the plant integrates a motion of {way:.4g} rad to an end that is {difference:.2g} '
             f'rad from what exact or common steps found, beyond {allowed:.2g} rad',
         )
+
+
+def _fastest(case: Case) -> float:
+    """Return the frequency of the fastest oscillation of the true arm [rad/s]."""
+    held = case.true.stiffness / case.true.inertia[-1, -1]
+    last, both = case.true.inertia[-1, -1], case.true.inertia[-2:, -2:].trace()
+    return float(np.sqrt(held * max(1.0, both / (both - last))))
 
 
 def residuals(motions: Motions, ends: States) -> FloatArray:

@@ -40,7 +40,7 @@ from flat_planner_ros.core.study.planned import (
     refusal,
 )
 from flat_planner_ros.core.study.playing import ends_of, misses, Motions, motions_of, residuals
-from flat_planner_ros.core.study.tracked import tracked_end
+from flat_planner_ros.core.study.tracked import tracked_ends
 import numpy as np
 from numpy.typing import NDArray
 
@@ -174,7 +174,10 @@ class _Rows:
         self.table['verdict'] = column(('',) * count)
 
     def refuse(self, places: NDArray[np.intp], said: Answer) -> None:
-        """Enter a refusal of some rows."""
+        """Enter a refusal of some rows, which have no numbers."""
+        for title, values in self.table.items():
+            if title != 'verdict':
+                values[places] = nan
         self.table['verdict'][places] = said.verdict
         self.table[TIME][places] = said.seconds
 
@@ -271,30 +274,21 @@ class _Rows:
         self, cases: Sequence[Case], samples: Sequence[PlanSamples], places: NDArray[np.intp]
     ) -> None:
         """Enter what motions leave when they are carried out."""
-        if cases[0].tracker is not None:
-            done, ends = _tracked(cases, samples, self, places)
-            if ends is not None:
-                self._finish(motions_of([cases[index] for index in done]), ends, places[done])
+        checked = self._checked[places].tolist()
+        if cases[0].tracker is None:
+            motions = motions_of(cases)
+            self._finish(motions, ends_of(motions, commands_of(samples), checked), places)
             return
-        motions, checked = motions_of(cases), self._checked[places].tolist()
-        self._finish(motions, ends_of(motions, commands_of(samples), checked), places)
-
-
-def _tracked(
-    cases: Sequence[Case], samples: Sequence[PlanSamples], rows: _Rows, places: NDArray[np.intp]
-) -> tuple[list[int], States | None]:
-    """Return which cases a tracker carries out, and how they end; the others are refused."""
-    done, ends = [], []
-    for index, (case, motion) in enumerate(zip(cases, samples, strict=True)):
-        try:
-            ends.append(tracked_end(case, motion))
-        except FlatPlannerError as error:
-            rows.refuse(places[index : index + 1], refusal(error))
-        else:
-            done.append(index)
-    if not ends:
-        return done, None
-    return done, States(*(np.concatenate(tables) for tables in zip(*ends, strict=True)))
+        done, ends = [], []
+        for index, end in enumerate(tracked_ends(cases, samples, checked)):
+            if isinstance(end, FlatPlannerError):
+                self.refuse(places[index : index + 1], refusal(end))
+            else:
+                done.append(index)
+                ends.append(end)
+        if ends:
+            whole = States(*(np.concatenate(tables) for tables in zip(*ends, strict=True)))
+            self._finish(motions_of([cases[index] for index in done]), whole, places[done])
 
 
 def commands_of(samples: Sequence[PlanSamples]) -> CommandTable:

@@ -20,6 +20,7 @@ from flat_planner_ros.core.tracking.moving_start import moving_start, MovingStar
 from flat_planner_ros.core.tracking.settings import TrackerSettings, Uncertainty
 from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion
 from flat_planner_ros.core.tracking.tracker import Phase, Tracker
+from flat_planner_ros.core.tracking.tracker_stack import TrackerStack
 
 __all__ = [
     'ArmObserver',
@@ -32,5 +33,6 @@ __all__ = [
     'TrackedMotion',
     'Tracker',
     'TrackerSettings',
+    'TrackerStack',
     'Uncertainty',
 ]

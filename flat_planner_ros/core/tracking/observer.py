@@ -57,7 +57,7 @@ class Observer:
     bandwidth
         Of the estimate [rad/s].
     columns
-        Number of chains.
+        Number of chains, until a restart with another number.
 
     """
 
@@ -69,13 +69,12 @@ class Observer:
         self._series = np.array(
             [np.linalg.matrix_power(chain.disturbed, k)[:-1] / factorial(k) for k in range(TERMS)]
         ).reshape(TERMS, -1)
-        self._columns = columns
         m = chain.order
         self.restart(-inf, np.zeros((m // 2, columns)), np.zeros((m // 2, columns)))
 
     def restart(self, time: float, angles: FloatArray, rates: FloatArray) -> None:
         """Take angles and rates, shape (m / 2, columns), for the truth; forget inputs."""
-        self.time = time
+        self.time, self._columns = time, angles.shape[1]
         self.state = np.vstack([angles, rates, np.zeros((1, self._columns))])
         self._acting = np.zeros(self._columns)
         self._pending: list[_Input] = []

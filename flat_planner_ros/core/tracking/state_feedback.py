@@ -23,7 +23,7 @@ from flat_planner_ros.core.tracking.arm_observer import (
     Estimate,
     links_of,
 )
-from flat_planner_ros.core.tracking.chain import last_links, linearised_joint
+from flat_planner_ros.core.tracking.chain import Chain, last_links, linearised_joint
 from flat_planner_ros.core.tracking.gains import feedback_gain
 from flat_planner_ros.core.tracking.settings import TrackerSettings
 from flat_planner_ros.core.tracking.tracked_motion import Reference, TrackedMotion
@@ -117,10 +117,10 @@ class StateFeedback:
 
     def _effort(self, state: Estimate, planned: Reference, middle: Reference) -> float:
         """Return the effort of joint n-1 without friction [N m]."""
-        own = self._chain.dynamics[2].dot(_links_state(middle))
-        feed_forward = (middle.accelerations[:-1].sum() - own) / self._chain.input_effect[2]
-        error = state.links[:-1, 0] - _links_state(planned)
-        return float(feed_forward - self._links_gain.dot(error) - state.links[-1, 0])
+        ahead = feed_forward(self._chain, links_state(middle), middle.accelerations[:-1].sum())
+        return float(
+            links_effort(self._links_gain, state.links[:, 0], links_state(planned), ahead)
+        )
 
     def _accelerations(self, state: Estimate, planned: Reference, middle: Reference) -> FloatArray:
         """Return the accelerations of the joints before the last two, (n-2,) [rad/s^2]."""
@@ -154,6 +154,45 @@ def _errors(state: Estimate, planned: Reference) -> FloatArray:
     return state.angles - wanted
 
 
-def _links_state(reference: Reference) -> FloatArray:
+def links_state(reference: Reference) -> FloatArray:
     """Return the state of the last two links, shape (4,)."""
     return np.concatenate([links_of(reference.positions), links_of(reference.velocities)])[:, 0]
+
+
+def feed_forward(chain: Chain, links: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """
+    Return the effort of joint n-1 that a planned motion takes [N m].
+
+    Parameters
+    ----------
+    chain
+        The last two links.
+    links
+        Their planned states, shape (4, ...).
+    acceleration
+        Of link n-1, shape (...) [rad/s^2].
+
+    """
+    own = chain.dynamics[2].dot(links)
+    effort: FloatArray = (acceleration - own) / chain.input_effect[2]
+    return effort
+
+
+def links_effort(
+    gain: FloatArray, state: FloatArray, wanted: FloatArray, ahead: FloatArray
+) -> FloatArray:
+    """
+    Return the effort of joint n-1 without friction [N m], for one arm or many, shape (...).
+
+    Parameters
+    ----------
+    gain
+        Of the state, shape (4,).
+    state, wanted
+        Of the last two links: estimate with its disturbance, shape (5, ...), and plan, (4, ...).
+    ahead
+        Its feed-forward, shape (...) [N m].
+
+    """
+    effort: FloatArray = ahead - gain.dot(state[:-1] - wanted) - state[-1]
+    return effort

@@ -25,12 +25,12 @@ UNUSABLE = 1e6
 
 class Reference(NamedTuple):
     """
-    Where all joints should be at one time.
+    Where all joints should be at one time, or at many.
 
     Attributes
     ----------
     positions, velocities, accelerations
-        Shape (n,) [rad], [rad/s], [rad/s^2].
+        Shape (..., n) [rad], [rad/s], [rad/s^2].
 
     """
 
@@ -109,3 +109,11 @@ class TrackedMotion:
         if not self._times[0] <= elapsed <= self._times[-1]:
             return Reference(positions, velocities, np.zeros(self.joints))
         return Reference(positions, velocities, self._accelerations.at(elapsed)[0])
+
+    def through(self, times: FloatArray) -> Reference:
+        """Return what `at` does for each of many absolute times (k,) [s]."""
+        elapsed = times - self._start
+        positions, velocities = self._motion.through(elapsed)
+        is_under_way = (self._times[0] <= elapsed) & (elapsed <= self._times[-1])
+        accelerations = self._accelerations.through(elapsed)[0] * is_under_way[:, None]
+        return Reference(positions, velocities, accelerations)

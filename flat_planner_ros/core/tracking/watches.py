@@ -16,6 +16,7 @@
 
 from flat_planner_ros.core.arm import FloatArray
 import numpy as np
+from numpy.typing import NDArray
 
 AVERAGED = 0.2
 """Time over which the age of joint samples is averaged [s]: two swings of an unstable loop."""
@@ -98,4 +99,9 @@ class GrowthWatch:
             self._peaks = np.where(turned, 0.0, self._peaks)
             self._is_positive = errors > 0.0
         self._peaks = np.maximum(self._peaks, np.abs(errors))
-        return float(self._last[self._grown >= GROWN].max(initial=0.0))
+        return float(self._last[self.has_grown].max(initial=0.0))
+
+    @property
+    def has_grown(self) -> NDArray[np.bool_]:
+        """Tell for each angle whether its errors grow from swing to swing, shape (n,)."""
+        return self._grown >= GROWN

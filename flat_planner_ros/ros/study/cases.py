@@ -20,6 +20,7 @@ from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 from flat_planner_ros.core.arm import Drive, FlatPlannerError, FloatArray
+from flat_planner_ros.core.planning import JointLimits
 from flat_planner_ros.core.study import (
     Answer,
     Batch,
@@ -33,6 +34,7 @@ from flat_planner_ros.core.study import (
 )
 from flat_planner_ros.ros.parameters import planner, plant, tracker
 from flat_planner_ros.ros.parameters.arm_model import model_defaults, MODEL_ROWS
+from flat_planner_ros.ros.parameters.limits import LIMITS
 from flat_planner_ros.ros.parameters.parameter_file import settings_of
 from flat_planner_ros.ros.programs.command_line import pose_of, via_point
 from flat_planner_ros.ros.study.spec import (
@@ -347,11 +349,18 @@ def _enter(given: dict[str, Any], name: str, value: Any) -> None:
         given[name] = value
         return
     parameter, place = element['name'], int(element['number']) - 1
-    numbers = list(given.get(parameter, ()))
+    numbers = list(given.get(parameter, ())) or _no_limits(given, parameter)
     if place >= len(numbers):
         raise InvalidStudy(f'{name}: {parameter} has {len(numbers)} numbers')
     numbers[place] = value
     given[parameter] = numbers
+
+
+def _no_limits(given: Mapping[str, Any], parameter: str) -> list[float]:
+    """Return the numbers of a limit of joints that is not set; none for other parameters."""
+    unlimited = JointLimits.of(len(given.get('joints', ())))
+    limits = {f'limits.{name}': getattr(unlimited, name) for name in LIMITS}
+    return list(limits[parameter].tolist()) if parameter in limits else []
 
 
 def _out_of_range(numbers: Mapping[str, Column]) -> Iterator[tuple[NDArray[np.intp], Answer]]:

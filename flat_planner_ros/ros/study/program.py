@@ -38,6 +38,7 @@ from flat_planner_ros.core.study import (
     ACCEPTED,
     Answer,
     answer,
+    Case,
     chunks_of,
     here,
     on_executor,
@@ -315,9 +316,16 @@ def _interruptible() -> Iterator[None]:
 
 def _summarise(options: Namespace, study: Study, target: Path) -> None:
     """Say what the rows have become, and draw them."""
-    counts = Counter(verdict for (verdict,) in cells_of(target, [VERDICT]))
+    counts, first, stream = Counter[str](), dict[str, int](), summary_stream(options.figure)
+    for row, (verdict,) in enumerate(cells_of(target, [VERDICT])):
+        counts[verdict] += 1
+        first.setdefault(verdict, row)
     words = ', '.join(f'{count} {verdict}' for verdict, count in counts.most_common())
-    print(f'{study.count} rows in {target}: {words}', file=summary_stream(options.figure))
+    print(f'{study.count} rows in {target}: {words}', file=stream)
+    for verdict, _ in counts.most_common():
+        if verdict != ACCEPTED:
+            said = _said(study.case(first[verdict]))
+            print(f'  {verdict}, as row {first[verdict]}: {said.message}', file=stream)
     if options.figure is None:
         return
     # Imported here: matplotlib is an extra.
@@ -341,6 +349,11 @@ def _summarise(options: Namespace, study: Study, target: Path) -> None:
     print(f'figure: {options.figure}', file=sys.stderr)
 
 
+def _said(case: Case | Answer) -> Answer:
+    """Return what the planner says to a row."""
+    return case if isinstance(case, Answer) else answer(case)
+
+
 def _show_row(options: Namespace, study: Study, cases: Cases) -> int:
     """Print one row, and the line that repeats it; draw its motion."""
     if not options.row < study.count:
@@ -354,7 +367,7 @@ def _show_row(options: Namespace, study: Study, cases: Cases) -> int:
     for title, cell in zip(header, cells, strict=True):
         print(f'{title:{width}}  {cell}', file=stream)
     case = study.case(options.row)
-    said = case if isinstance(case, Answer) else answer(case)
+    said = _said(case)
     if said.verdict != ACCEPTED:
         print(f'{said.verdict}: {said.message}', file=stream)
     if not isinstance(case, Answer):
