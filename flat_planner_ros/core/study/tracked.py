@@ -21,7 +21,7 @@ Each of the others goes by itself, sample by sample; so do those in which a trac
 
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from math import ceil
 from typing import NamedTuple
@@ -69,6 +69,30 @@ class _Grid(NamedTuple):
     step: float
     per_period: int
     late: int
+
+
+@dataclass(frozen=True)
+class _Model:
+    """
+    A model, equal to others with the same numbers.
+
+    Attributes
+    ----------
+    arm
+        The model.
+    numbers
+        All of it.
+
+    """
+
+    arm: PlanarArm = field(compare=False)
+    numbers: tuple[bytes, ...]
+
+    @classmethod
+    def of(cls, arm: PlanarArm) -> '_Model':
+        """Return a model."""
+        values = (getattr(arm, each.name) for each in fields(arm))
+        return cls(arm, tuple(np.asarray(value).tobytes() for value in values))
 
 
 def tracked_ends(
@@ -162,19 +186,18 @@ def _side_by_side(cases: Sequence[Case]) -> Iterable[list[int]]:
     is_plain = replace(case.drives, servo_bandwidth=0.0) == DriveSettings()
     if case.true.n != 2 or not is_plain or case.tracker is None or not case.tracker.hold:
         return
-    models: dict[int, list[int]] = {}
+    models: dict[_Model, list[int]] = {}
     for place, each in enumerate(cases):
         if each.true.is_linear:
-            models.setdefault(id(each.settings.arm), []).append(place)
+            models.setdefault(_Model.of(each.settings.arm), []).append(place)
     for places in models.values():
-        if len(places) > 1:
-            yield from (places[k : k + TOGETHER] for k in range(0, len(places), TOGETHER))
+        yield from (places[k : k + TOGETHER] for k in range(0, len(places), TOGETHER))
 
 
 @lru_cache(maxsize=LOOPS_KEPT)
-def _loop(arm: PlanarArm, settings: TrackerSettings) -> TrackerStack:
+def _loop(model: _Model, settings: TrackerSettings) -> TrackerStack:
     """Return trackers of a model."""
-    return TrackerStack(arm, settings)
+    return TrackerStack(model.arm, settings)
 
 
 def _together(
@@ -184,7 +207,7 @@ def _together(
     settings = cases[0].tracker
     assert settings is not None
     try:
-        loop = _loop(cases[0].settings.arm, settings)
+        loop = _loop(_Model.of(cases[0].settings.arm), settings)
     except FlatPlannerError as error:
         return [error] * len(cases)
     grid, period = _grid(cases[0], settings), settings.period

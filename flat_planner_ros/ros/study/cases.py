@@ -294,7 +294,8 @@ class Cases:
                 true[:, place] *= numbers.get(name, scales[name])
         payload = true[:, 1] * numbers.get(PAYLOAD, scales[PAYLOAD])
         true[:, :2] += payload[:, None]
-        return model, true
+        varies = any(name in MODEL_NUMBERS for name in numbers)
+        return model if varies else None, true
 
 
 @lru_cache(maxsize=TEMPLATES_KEPT)
