@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+import re
 from typing import Any
 
 from flat_planner_ros.core.arm import FlatPlannerError, placed_masses, PlanarArm
@@ -28,6 +29,8 @@ import yaml
 DIGITS = 8
 """Significant digits of a written number."""
 
+MATCHES = 'The scales of mismatch are 1.0 now: the model is what the simulated arm was.'
+
 
 class UnwritableModel(FlatPlannerError):
     """A model that the form of the parameter file cannot say; the message names the remedy."""
@@ -36,6 +39,8 @@ class UnwritableModel(FlatPlannerError):
 def write_fitted(source: Path, fit: ModelFit, before: PlanarArm, target: Path) -> None:
     """
     Write a parameter file anew with another model, everything else as it was.
+
+    But for the mismatch of a simulated arm, if there was one: what was found holds it already.
 
     Parameters
     ----------
@@ -62,7 +67,9 @@ def write_fitted(source: Path, fit: ModelFit, before: PlanarArm, target: Path) -
         raise UnwritableModel(f'{source} has no block with model: to be changed')
     for block in blocks:
         _change(block, fit.arm, before)
-    head = ''.join(f'# {line}\n' for line in ('The model was fitted:', *fit.text.splitlines()))
+    remarks = [MATCHES] if _end_mismatch(tree) else []
+    lines = ('The model was fitted:', *fit.text.splitlines(), *remarks)
+    head = ''.join(f'# {line}\n' for line in lines)
     body = yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=100)
     target.write_text(head + '\n' + body, 'utf-8')
 
@@ -74,6 +81,21 @@ def _with_model(tree: Any) -> Iterator[dict[str, Any]]:
             yield tree
         for value in tree.values():
             yield from _with_model(value)
+
+
+def _end_mismatch(tree: Any, group: str = '') -> bool:
+    """Let a simulated arm be its model; return whether it was another one."""
+    if not isinstance(tree, dict):
+        return False
+    changed = False
+    for key, value in tree.items():
+        name = f'{group}.{key}' if group == 'mismatch' else str(key)
+        if re.fullmatch(r'mismatch\.\w+_scale', name):
+            changed |= value != 1.0
+            tree[key] = 1.0
+        else:
+            changed |= _end_mismatch(value, name)
+    return changed
 
 
 def _change(block: dict[str, Any], arm: PlanarArm, before: PlanarArm) -> None:

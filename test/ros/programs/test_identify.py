@@ -34,6 +34,7 @@ from sensor_msgs.msg import JointState
 
 pytest.importorskip('mcap')
 
+from flat_planner_ros.ros.parameters.fitted_file import MATCHES  # noqa: E402, I100
 from flat_planner_ros.ros.programs import identify  # noqa: E402, I100  It needs it.
 from flat_planner_ros.ros.recording.csv_table import UnreadableTable  # noqa: E402
 from flat_planner_ros.ros.recording.measured import measured  # noqa: E402
@@ -68,7 +69,10 @@ def test_a_recording_becomes_a_parameter_file(tmp_path, capsys):
     pytest.importorskip('matplotlib')
     bag, fitted, picture = (tmp_path / name for name in ('a.mcap', 'arm.yaml', 'fit.png'))
     write(bag)
-    options = ['--params-file', str(SHIPPED), '-o', str(fitted), '--plot', str(picture)]
+    believed = tmp_path / 'believed.yaml'
+    scale = 'stiffness_scale: {}'.format
+    believed.write_text(SHIPPED.read_text('utf-8').replace(scale(1.0), scale(0.87)), 'utf-8')
+    options = ['--params-file', str(believed), '-o', str(fitted), '--plot', str(picture)]
     assert identify.main(['identify', str(bag), *options]) == 0
     printed = capsys.readouterr().out
     assert 'stiffness' in printed
@@ -79,7 +83,10 @@ def test_a_recording_becomes_a_parameter_file(tmp_path, capsys):
         [*TRUE.inertia_star, TRUE.stiffness, TRUE.damping], rel=0.01
     )
     assert np.allclose(arm.viscous_friction, TRUE.viscous_friction, rtol=0.01)
-    assert f'# {printed.splitlines()[0]}' in fitted.read_text('utf-8')
+    text = fitted.read_text('utf-8')
+    assert f'# {printed.splitlines()[0]}' in text
+    assert scale(0.87) not in text
+    assert MATCHES in text
 
 
 def test_a_trusted_inertia_is_kept(tmp_path, capsys):
