@@ -17,16 +17,24 @@
 from argparse import Namespace
 from dataclasses import replace
 from itertools import count
+from time import process_time
 
 from flat_planner_ros.core import (
+    Goal,
+    GoalPoint,
+    JointLimits,
     MotionRequest,
     plan,
+    PlannerSession,
     PlanningOptions,
+    SessionSettings,
     Strategy,
     ViaPoint,
     with_via_times,
 )
-from measurement import duration_text, Section, timing
+from flat_planner_ros.core.planning import Reason, RequestRejected
+from flat_planner_ros.core.session import StartSource
+from measurement import duration_text, Section, Timing, timing, verdict
 import numpy as np
 import problem
 
@@ -45,11 +53,18 @@ OPTIONS = {
 SAMPLES = 1001
 """Points at which the motion is sampled, as in the other tables."""
 
+TAKEOVERS = 60
+"""Goals that take over from a motion, in each row."""
+
+LIMITS = JointLimits.of(2, velocity=np.array([12.0, np.inf]))
+"""Of the goals whose duration is the shortest [rad/s]."""
+
 
 def sections(options: Namespace) -> list[Section]:
     """Return the tables of this benchmark."""
     del options
-    return [_given(name) for name in OPTIONS] + [_chosen(name) for name in OPTIONS]
+    tables = [_given(name) for name in OPTIONS] + [_chosen(name) for name in OPTIONS]
+    return [*tables, _takeovers()]
 
 
 def _requests(points: int):
@@ -127,3 +142,62 @@ def _chosen(name: str) -> Section:
         )
     header = ('via points', 'times, median', 'worst', 'cost at even times / at these, one case')
     return Section(f'Times of via points, {name}', header, rows)
+
+
+def _takeovers() -> Section:
+    """Return the table of goals in motion whose via points choose their times."""
+    rows, worst, busy = [], 0.0, 0
+    for name, options in OPTIONS.items():
+        for what, changes in (
+            ('5 s', {'default_duration': 5.0}),
+            ('the shortest', {'limits': LIMITS}),
+        ):
+            settings = SessionSettings(
+                joints=('joint1', 'joint2'),
+                arm=problem.arm(),
+                options=options,
+                start_source=StartSource.PARAMETER,
+                start_position=(0.0, 0.0),
+                **changes,
+            )
+            for points in (2, 5, 10):
+                _takeover(settings, points, TAKEOVERS)  # loads what is loaded late
+                taken = [_takeover(settings, points, seed) for seed in range(TAKEOVERS)]
+                late = sum(is_late for _, is_late in taken)
+                times = Timing.of([time for time, _ in taken])
+                busy, worst = busy + late, max(worst, times.worst)
+                cells = duration_text(times.median), duration_text(times.worst)
+                rows.append((f'{points} via points in {what}, {name}', *cells, f'{late}'))
+    lookahead = SessionSettings.lookahead
+    return Section(
+        f'Goals with via points in motion, {duration_text(lookahead)} ahead',
+        ('times chosen for', 'goal to motion, median', 'worst', 'BUSY'),
+        rows,
+        [
+            f'{TAKEOVERS} random goals each, from the midst of another motion; never BUSY: '
+            f'{verdict(busy == 0)}, the slowest takes {100.0 * worst / lookahead:.0f} % of the '
+            f'lookahead',
+            'times are of the processor: on a busy machine goals take longer',
+        ],
+    )
+
+
+def _takeover(settings: SessionSettings, points: int, seed: int) -> tuple[float, bool]:
+    """Return how long a goal in the midst of a motion takes [s], and if that is too long."""
+    rng = np.random.default_rng([points, seed])
+    session, begin = PlannerSession(settings), 100.0
+    way = Goal(joint_names=('joint1',), points=(GoalPoint(time=2.0, positions=(2.0,)),))
+    running = session.submit(replace(way, stamp=begin + 1.0), begin)
+    now = running.start + rng.uniform(0.2, 1.5)
+    angles = rng.normal(size=(points + 1, 1))
+    through = tuple(GoalPoint(time=0.0, positions=tuple(angle.tolist())) for angle in angles)
+    goal = replace(way, points=through)
+    started = process_time()
+    try:
+        session.submit(goal, now, lambda: now + process_time() - started)
+    except RequestRejected as error:
+        # What overshoots on its way does so however long it takes.
+        if error.reason not in (Reason.BUSY, Reason.VELOCITY_LIMIT):
+            raise
+        return process_time() - started, error.reason is Reason.BUSY
+    return process_time() - started, False

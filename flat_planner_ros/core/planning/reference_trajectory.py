@@ -53,6 +53,9 @@ MAX_NUMBER = 1e300
 PROBLEMS_KEPT = 64
 """Combinations of arm, options and duration whose unit motion is remembered."""
 
+EQUATIONS_KEPT = 16
+"""Combinations of arm and options whose equation is remembered, for other durations."""
+
 GRIDS_KEPT = 32
 """Sampled unit motions in the cache."""
 
@@ -151,13 +154,11 @@ def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Mot
         The arm, the weights or the equation allow no plan.
 
     """
-    mapping = flat_map(arm, options.flat_model)
-    r, p = options.weights(arm)
-    cost = strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
+    mapping, cost, characteristic = _equation(arm, options)
     half = 0.5 * float(duration)
     powers = half**_ORDERS
     with strict_arithmetic():
-        unit = unit_motion(cost.characteristic() * powers[::-1] ** 2)
+        unit = unit_motion(characteristic * powers[::-1] ** 2)
         rates = 1.0 / powers
         largest = float((rates * unit.peaks).max())
     # (35) with every derivative in units of the half duration.
@@ -175,6 +176,17 @@ def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Mot
         cost_value=cost_value,
         reach=reach,
     )
+
+
+@lru_cache(maxsize=EQUATIONS_KEPT)
+def _equation(
+    arm: PlanarArm, options: PlanningOptions
+) -> tuple[FlatMap, QuadraticCost, FloatArray]:
+    """Return what no duration changes: flat map, cost and characteristic polynomial."""
+    mapping = flat_map(arm, options.flat_model)
+    r, p = options.weights(arm)
+    cost = strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
+    return mapping, cost, locked(cost.characteristic())
 
 
 def _grid(problem: MotionProblem, intervals: int) -> FloatArray:
