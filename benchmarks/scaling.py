@@ -23,7 +23,7 @@ import subprocess
 import sys
 
 from flat_planner_ros.core import MotionRequest, plan, PlanarArm
-from flat_planner_ros.core.planning.reference_trajectory import MAX_KEPT_INTERVALS
+from flat_planner_ros.core.planning.motion_problem import MAX_KEPT_INTERVALS
 from measurement import duration_text, Section, Timing, timing
 import numpy as np
 from numpy.typing import NDArray

@@ -41,10 +41,12 @@ from flat_planner_ros.core.motion_law.law import (
 from flat_planner_ros.core.motion_law.legendre_series import differentiation, integration
 from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 from flat_planner_ros.core.motion_law.path_cost import PathCost
+from flat_planner_ros.core.motion_law.simple_roots import characteristic_roots
 from flat_planner_ros.core.motion_law.unit_table import unit_table, UnitGroup, UnitMotions
 
 __all__ = [
     'BoundaryConditions',
+    'characteristic_roots',
     'CONDITIONS',
     'costate',
     'differentiation',

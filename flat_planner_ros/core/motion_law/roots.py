@@ -100,7 +100,7 @@ class Spectrum:
         """Find the roots."""
         self._zeros = next(k for k, a in enumerate(coefficients.tolist()) if a != 0.0)
         self._reduced = coefficients[self._zeros :]
-        self._squares = _companion_roots(self._reduced)
+        self._squares = companion_roots(self._reduced)
         self._alone = _polished_roots(self._reduced.tolist(), self._squares.tolist())
         self._apart_beyond = inf if self._alone is None else _apart_beyond(self._alone)
         self._grouped: dict[bytes, list[Cluster]] = {}
@@ -168,7 +168,7 @@ class Spectrum:
         ]
 
 
-def _companion_roots(ascending: NDArray[Number]) -> ComplexArray:
+def companion_roots(ascending: NDArray[Number]) -> ComplexArray:
     """Return the roots, conjugates exact; scaled to size one, so that nothing overflows."""
     first = ascending[-2::-1].tolist()
     degree = len(first)
@@ -362,7 +362,7 @@ def _roots(factor: list[complex]) -> list[complex]:
     if len(factor) == 2:
         return [-factor[1]]
     full = np.array(factor[::-1])
-    roots: list[complex] = _companion_roots(full if full.imag.any() else full.real).tolist()
+    roots: list[complex] = companion_roots(full if full.imag.any() else full.real).tolist()
     return roots
 
 

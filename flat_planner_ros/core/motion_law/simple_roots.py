@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
-from flat_planner_ros.core.motion_law.roots import CONVERGED, MAX_STEPS
+from flat_planner_ros.core.motion_law.roots import companion_roots, CONVERGED, MAX_STEPS
 from flat_planner_ros.core.motion_law.unit_motions import IntArray
 import numpy as np
 
@@ -78,6 +78,15 @@ def simple_roots(coefficients: FloatArray) -> Iterator[SimpleRoots]:
             yield SimpleRoots(
                 rows=rows[some[grows]], decays=decays[grows], zeros=count, pairs=pairs
             )
+
+
+def characteristic_roots(coefficients: FloatArray) -> ComplexArray:
+    """Return the roots of an equation a_0 ... a_6, one of each +-beta, not refined, shape (6,)."""
+    zeros = next(k for k, a in enumerate(coefficients.tolist()) if a != 0.0)
+    squares = np.zeros(len(coefficients) - 1, dtype=complex)
+    squares[zeros:] = companion_roots(coefficients[zeros:])
+    roots: ComplexArray = np.sqrt(squares)
+    return roots
 
 
 def _squares(ascending: FloatArray) -> ComplexArray:

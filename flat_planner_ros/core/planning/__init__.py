@@ -30,8 +30,8 @@ from flat_planner_ros.core.planning.cost_weights import (
 from flat_planner_ros.core.planning.duration_rules import DurationRules, OnViolation
 from flat_planner_ros.core.planning.extrema import Extrema, extrema_of, Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
+from flat_planner_ros.core.planning.motion_problem import joint_rows, MAX_NUMBER
 from flat_planner_ros.core.planning.planner import NO_DISTANCE, plan
-from flat_planner_ros.core.planning.reference_trajectory import joint_rows, MAX_NUMBER
 from flat_planner_ros.core.planning.request import (
     MotionRequest,
     planned_at_rest,

@@ -20,9 +20,9 @@ from math import ceil
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import apply_row, FloatArray, locked, UncertifiedPlan
+from flat_planner_ros.core.planning.motion_problem import MotionProblem
 from flat_planner_ros.core.planning.reference_trajectory import (
     even_times,
-    MotionProblem,
     ReferenceTrajectory,
     RestToRestTrajectory,
 )

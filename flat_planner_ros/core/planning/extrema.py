@@ -26,7 +26,7 @@ from enum import Enum
 from math import ceil, log2
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law import CONDITIONS
 from flat_planner_ros.core.planning.certified_plan import Plan, PlanSamples
 from flat_planner_ros.core.planning.reference_trajectory import ReferenceTrajectory
@@ -183,7 +183,7 @@ def extrema_of(plan: Plan, quantities: Sequence[Quantity] = tuple(Quantity)) -> 
 
 def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     """Return series of all joints' quantities, in the order of quantities and joints."""
-    bounds, orders = _first_bounds(plan.trajectory, plan.problem.unit.rates)
+    bounds, orders = _first_bounds(plan.trajectory)
     starts, lengths = bounds[:-1], np.diff(bounds)
     scale, layer_scale = _Range(), _Range()
     done: list[tuple[FloatArray, FloatArray, FloatArray, BoolArray]] = []
@@ -214,7 +214,7 @@ def _resolved(plan: Plan, quantities: Sequence[Quantity]) -> _Mesh:
     return _Mesh(starts=starts, lengths=lengths, values=values, resolved=resolved)
 
 
-def _first_bounds(trajectory: ReferenceTrajectory, rates: ComplexArray) -> tuple[FloatArray, int]:
+def _first_bounds(trajectory: ReferenceTrajectory) -> tuple[FloatArray, int]:
     """
     Return times between which laws are smooth, and the number of continuous derivatives.
 
@@ -226,7 +226,7 @@ def _first_bounds(trajectory: ReferenceTrajectory, rates: ComplexArray) -> tuple
     edges = np.array(trajectory.edges)
     lengths = np.diff(edges)
     share = lengths.max() / (edges[-1] - edges[0])
-    rate = share * np.abs(rates.real).max(initial=SEEN_RATE)
+    rate = share * np.abs(trajectory.roots.real).max(initial=SEEN_RATE)
     depth = ceil(log2(max(rate / SEEN_RATE, 1.0)))
     layers = FIRST_LAYER * 0.5 ** np.arange(depth, -1.0, -1.0)
     cuts = np.append(layers, SECOND_CUT)

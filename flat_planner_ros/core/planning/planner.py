@@ -38,10 +38,9 @@ from flat_planner_ros.core.motion_law import (
     SummedLaw,
 )
 from flat_planner_ros.core.planning.certified_plan import BOUNDARY_TOLERANCE, Plan
+from flat_planner_ros.core.planning.motion_problem import MotionProblem, problem_of
 from flat_planner_ros.core.planning.reference_trajectory import (
     LawTrajectory,
-    MotionProblem,
-    problem_of,
     ReferenceTrajectory,
     RestToRestTrajectory,
 )

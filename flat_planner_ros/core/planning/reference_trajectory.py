@@ -15,195 +15,22 @@
 """
 Reference trajectories: the planned variables over time, however their laws were found.
 
-From rest to rest all planned variables are multiples of one unit motion, which is solved once for
-an arm, a cost and a duration, and kept with its samples; any other trajectory is evaluated law by
-law.
+From rest to rest they are multiples of the unit motion of their problem; any other trajectory is
+evaluated law by law.
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
-from flat_planner_ros.core.arm import (
-    apply_row,
-    flat_map,
-    FlatMap,
-    FloatArray,
-    locked,
-    PlanarArm,
-    strict_arithmetic,
-)
-from flat_planner_ros.core.motion_law import (
-    CONDITIONS,
-    JET_ORDER,
-    Law,
-    motion_quadrature,
-    QuadraticCost,
-    strategy_cost,
-    unit_motion,
-    UnitMotion,
-)
+from flat_planner_ros.core.arm import apply_row, ComplexArray, FloatArray, locked
+from flat_planner_ros.core.motion_law import CONDITIONS, JET_ORDER, Law, motion_quadrature
 from flat_planner_ros.core.peak import PeakMotion
-from flat_planner_ros.core.planning.request import PlanningOptions
+from flat_planner_ros.core.planning.motion_problem import MotionProblem
 import numpy as np
-
-MAX_NUMBER = 1e300
-"""Largest number in a plan; products with weights of order one still have room."""
-
-PROBLEMS_KEPT = 64
-"""Combinations of arm, options and duration whose unit motion is remembered."""
-
-EQUATIONS_KEPT = 16
-"""Combinations of arm and options whose equation is remembered, for other durations."""
-
-GRIDS_KEPT = 32
-"""Sampled unit motions in the cache."""
-
-MAX_KEPT_INTERVALS = 10_000
-"""Longest grid that is kept; with `GRIDS_KEPT` it bounds the caches to 24 MB."""
 
 NODES_PER_PIECE = 8
 """Gauss-Legendre nodes between two knots of an effort that is linear there."""
-
-_ORDERS = np.arange(JET_ORDER + 1.0)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MotionProblem:
-    """
-    What a plan is made from, besides its ends: the motion over 1 rad.
-
-    Attributes
-    ----------
-    arm
-        What moves.
-    duration
-        Length of the motion [s].
-    cost
-        What is minimised.
-    flat_map
-        From the planned variable to the joints.
-    unit
-        The law in normalised time.
-    rates
-        Factors of its derivatives 0 to 6 in physical time, shape (7,) [1/s^k].
-    cost_value
-        Cost of 1 rad.
-    reach
-        Distance from which numbers overflow [rad].
-
-    """
-
-    arm: PlanarArm
-    duration: float
-    cost: QuadraticCost
-    flat_map: FlatMap
-    unit: UnitMotion
-    rates: FloatArray
-    cost_value: float
-    reach: float
-
-    @cached_property
-    def rows(self) -> FloatArray:
-        """Torque and velocities of the last two joints from the unit motion's jet, (3, 7)."""
-        return joint_rows(self.flat_map) * self.rates
-
-    def grid(self, intervals: int) -> FloatArray:
-        """Return derivatives 0 to 6 and driving effort at even times, read-only, shape (8, m)."""
-        if intervals > MAX_KEPT_INTERVALS:
-            return _grid(self, intervals)
-        return _kept_grid(self, intervals)
-
-    def fill_grid(self, table: FloatArray, distance: float) -> None:
-        """Write derivatives 0 to 6 and driving effort over a distance at even times, (8, m)."""
-        intervals = table.shape[1] - 1
-        if intervals <= MAX_KEPT_INTERVALS:
-            np.multiply(_kept_grid(self, intervals), distance, out=table)
-        else:
-            _fill(self, table, distance)
-
-
-def joint_rows(mapping: FlatMap) -> FloatArray:
-    """
-    Return effort of joint n-1, velocity of link n-1 and of joint n from the planned variable.
-
-    Returns
-    -------
-    FloatArray
-        Factors of its derivatives 0 to 6, shape (3, 7) [N m s^k / rad] and [s^(k - 1)].
-
-    """
-    rows = np.zeros((3, JET_ORDER + 1))
-    rows[0, : len(mapping.effort)] = mapping.effort
-    rows[1, 1 : len(mapping.output) + 1] = mapping.output
-    rows[2, 1 : len(mapping.deflection) + 1] = mapping.deflection
-    rows[1] -= rows[2]
-    return rows
-
-
-@lru_cache(maxsize=PROBLEMS_KEPT)
-def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> MotionProblem:
-    """
-    Return what plans of an arm have in common; arms and options count as equal if identical.
-
-    Raises
-    ------
-    ArithmeticError
-        The numbers leave double precision.
-    FlatPlannerError
-        The arm, the weights or the equation allow no plan.
-
-    """
-    mapping, cost, characteristic = _equation(arm, options)
-    half = 0.5 * float(duration)
-    powers = half**_ORDERS
-    with strict_arithmetic():
-        unit = unit_motion(characteristic * powers[::-1] ** 2)
-        rates = 1.0 / powers
-        largest = float((rates * unit.peaks).max())
-    # (35) with every derivative in units of the half duration.
-    cost_value = unit.costate * half ** (1.0 - 2.0 * CONDITIONS)
-    # A law that is no minimum, which its certificate refuses, might have a negative cost.
-    # Roots first: a cost of less than 1e-8 would take the quotient out of range.
-    reach = min(MAX_NUMBER / largest, MAX_NUMBER**0.5 / cost_value**0.5) if cost_value > 0 else 0.0
-    return MotionProblem(
-        arm=arm,
-        duration=duration,
-        cost=cost,
-        flat_map=mapping,
-        unit=unit,
-        rates=rates,
-        cost_value=cost_value,
-        reach=reach,
-    )
-
-
-@lru_cache(maxsize=EQUATIONS_KEPT)
-def _equation(
-    arm: PlanarArm, options: PlanningOptions
-) -> tuple[FlatMap, QuadraticCost, FloatArray]:
-    """Return what no duration changes: flat map, cost and characteristic polynomial."""
-    mapping = flat_map(arm, options.flat_model)
-    r, p = options.weights(arm)
-    cost = strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
-    return mapping, cost, locked(cost.characteristic())
-
-
-def _grid(problem: MotionProblem, intervals: int) -> FloatArray:
-    """Return the motion over 1 rad at even times."""
-    table = np.empty((len(problem.rates) + 1, intervals + 1))
-    _fill(problem, table, 1.0)
-    return locked(table)
-
-
-def _fill(problem: MotionProblem, table: FloatArray, distance: float) -> None:
-    """Write the motion over a distance at even times."""
-    problem.unit.fill_grid(table[:-1], distance * problem.rates)
-    row = problem.flat_map.effort
-    np.matmul(row, table[: len(row)], out=table[-1])
-
-
-_kept_grid = lru_cache(maxsize=GRIDS_KEPT)(_grid)
 
 
 def even_times(duration: float, intervals: int) -> FloatArray:
@@ -246,6 +73,10 @@ class ReferenceTrajectory(Protocol):
     @property
     def nodes(self) -> 'MotionNodes':
         """Return the motion at the nodes of a quadrature that resolves it."""
+
+    @property
+    def roots(self) -> ComplexArray:
+        """Return how fast the laws may be: roots in units of 2 / duration, shape (m,) [-]."""
 
 
 class MotionNodes(NamedTuple):
@@ -348,8 +179,13 @@ class RestToRestTrajectory:
     def nodes(self) -> MotionNodes:
         """Return the motion at the nodes of a quadrature that resolves it."""
         travel = sum(abs(distance) for distance in self.distances)
-        times, weights = motion_quadrature(self.problem.unit.rates, travel, self.edges)
+        times, weights = motion_quadrature(self.roots, travel, self.edges)
         return MotionNodes(times, weights, self.jets(times))
+
+    @property
+    def roots(self) -> ComplexArray:
+        """Return how fast the unit motion is: rates in units of 2 / duration, shape (m,) [-]."""
+        return self.problem.unit.rates
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -435,4 +271,9 @@ class LawTrajectory:
         if len(self.edges) > 2:
             places = np.array([law.jet(np.array(self.edges), 0)[0] for law in self.laws])
         travel = float(np.abs(np.diff(places)).sum())
-        return motion_quadrature(self.problem.unit.rates, travel, self.edges)
+        return motion_quadrature(self.roots, travel, self.edges)
+
+    @property
+    def roots(self) -> ComplexArray:
+        """Return the roots of the laws' equation in units of 2 / duration, shape (6,) [-]."""
+        return self.problem.roots

@@ -26,8 +26,8 @@ from math import inf, log
 
 from flat_planner_ros.core.arm import FloatArray, PlanarArm, UncertifiedPlan
 from flat_planner_ros.core.motion_law import PathConditions, PathCost, QuadraticCost
+from flat_planner_ros.core.planning.motion_problem import problem_of
 from flat_planner_ros.core.planning.planner import path_of
-from flat_planner_ros.core.planning.reference_trajectory import problem_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions, ViaPoint
 import numpy as np
 

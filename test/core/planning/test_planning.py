@@ -24,8 +24,8 @@ from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
 from flat_planner_ros.core.motion_law.extremal import BoundaryConditions
 from flat_planner_ros.core.planning import certified_plan
+from flat_planner_ros.core.planning.motion_problem import problem_of
 from flat_planner_ros.core.planning.planner import plan
-from flat_planner_ros.core.planning.reference_trajectory import problem_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 from flat_planner_ros.core.plant.effort_profile import EffortProfile
 from flat_planner_ros.core.plant.rollout import rollout
@@ -297,7 +297,7 @@ def test_costs_of_long_motions_do_not_overflow(paper_arm, duration, weight):
         options = PlanningOptions(strategy=name, r=weight, p=weight)
         with np.errstate(all='raise', under='ignore'):
             problem = problem_of(paper_arm, options, duration)
-        assert 0.0 < problem.reach < np.inf
+            assert 0.0 < problem.reach < np.inf
         if weight == 0.0:
             assert problem.cost_value < 1e-8
 

@@ -21,7 +21,7 @@ from threading import Barrier
 
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
-from flat_planner_ros.core.planning import reference_trajectory
+from flat_planner_ros.core.planning import motion_problem
 from flat_planner_ros.core.planning.planner import plan
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions
 import numpy as np
@@ -72,7 +72,7 @@ def test_plans_of_several_threads_are_the_same_as_of_one():
             duration = float(rng.uniform(0.5, 2.0))
             found = [pool.submit(together, arm, options, duration) for _ in range(THREADS)]
             # Alone, and nothing known.
-            reference_trajectory.problem_of.cache_clear()
+            motion_problem.problem_of.cache_clear()
             extremals.kept_units.cache_clear()
             expected = results(arm, options, duration)
             for each in found:
