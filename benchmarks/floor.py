@@ -32,12 +32,16 @@ def array_operations(made: Plan) -> Callable[[], object]:
     """
     Return a function that does what a cold plan asks of NumPy, on arrays of the same shapes.
 
-    Roots of the equation, the solved boundary conditions with one correction, the law at the
-    times of its certificate, and its samples. Nothing is formed, scaled, checked or kept.
+    Roots of the equation and the solved boundary conditions with one correction, or the solved
+    series of a slow one; the law at the times of its certificate, and its samples. Nothing is
+    formed, scaled, checked or kept.
     """
     unit = made.problem.unit
-    parts = _law_operations(unit.coefficients), _certificate_operations(unit.law.total)
-    samples = _sample_operations(unit.law.total, made.problem.flat_map.effort)
+    total = unit.law.total
+    is_series = not len(total.decays)
+    found = _series_operations(total) if is_series else _law_operations(unit.coefficients)
+    parts = found, _certificate_operations(total)
+    samples = _sample_operations(total, made.problem.flat_map.effort)
 
     def run() -> object:
         for part in parts:
@@ -62,6 +66,20 @@ def _law_operations(coefficients: np.ndarray) -> Callable[[], object]:
         solved = inverse @ target
         solved += inverse @ (target - matrix @ solved)
         return solved
+
+    return run
+
+
+def _series_operations(total) -> Callable[[], object]:
+    """Return what solves the system of a slow equation and writes its law in powers."""
+    orders, powers = total.factors.shape
+    terms = (powers - 12) // 2
+    system, table = np.ones((7, terms * (terms + 1))), np.ones((terms + 1, orders * powers))
+    coefficients, matrix = np.ones(7), np.eye(terms) + 0.1 * np.tri(terms).T
+
+    def run() -> object:
+        right = coefficients @ system
+        return np.append(np.linalg.solve(matrix, right[:terms]), 1.0) @ table
 
     return run
 
@@ -113,7 +131,10 @@ def _sample_operations(total, row: np.ndarray) -> Callable[[], object]:
 
 
 def _fill(table: np.ndarray, x: np.ndarray) -> None:
-    """Write ascending powers into rows."""
-    table[:1] = 1.0
-    for lower, higher in zip(table, table[1:], strict=False):
-        np.multiply(lower, x, out=higher)
+    """Write ascending powers into rows, twice as many with each product."""
+    table[:1], table[1:2] = 1.0, x
+    known = 2
+    while known < len(table):
+        more = min(known - 1, len(table) - known)
+        np.multiply(table[1 : 1 + more], table[known - 1], out=table[known : known + more])
+        known += more
