@@ -75,7 +75,7 @@ while not excitation.is_done:
     predicted.append(proposal.after[:6])
     peaks.append(np.abs(efforts).max())
     above.plot(begin + times, angles[:, 0], color='tab:blue')
-    above.plot(begin + times, angles[:, 1], color='tab:orange')
+    above.plot(begin + times, angles[:, 1], '--', color='tab:orange')
     begin += times[-1]
     print(
         f'{wanted.final[0]:6.2f} rad in {wanted.duration:.2f} s for {proposal.sought:18}: '
@@ -88,7 +88,8 @@ for name in ('stiffness', 'damping'):
     print(f'{name}: {getattr(found, name):.3g}, in truth {getattr(real, name):.3g}')
 
 above.set_xlabel('time, without the waiting [s]')
-above.set_ylabel('angle [rad]: joint 1 blue, passive orange')
+above.set_ylabel('angle [rad]')
+above.legend(above.lines[:2], ['joint 1', 'passive joint'], frameon=False)
 numbers = np.arange(1, len(reached) + 1)
 for label, errors, style in (('predicted', predicted, 'o--'), ('reached', reached, 'o-')):
     below.semilogy(numbers, 100 * np.max(errors, axis=1), style, label=label)

@@ -48,14 +48,26 @@ SAME = 1e-6
 FEW = 60
 """Different values of an axis up to which each is a place of its own, not a cloud."""
 
-CELLS = 30
-"""Parts of an axis into which a cloud is sorted."""
+MOST_CELLS = 30
+"""Most parts of an axis into which a cloud is sorted."""
+
+SPARSE = 0.4
+"""Share of a map's cells that rows meet below which it is drawn as points [-]."""
+
+TICKS = 7
+"""Most parts into which the marks below a picture divide it, so that long numbers have room."""
 
 FAMILY = 12
-"""Most curves of a family."""
+"""Most curves of a family, if each is of one value."""
+
+RANGES = 4
+"""Curves of a family with more values, each of a range."""
 
 BAND = (0.1, 0.9)
 """Quantiles between which a band lies about a curve."""
+
+BANDS = 'median, and between which values eight of ten rows lie'
+"""What a picture with bands says of them."""
 
 
 class Shown(NamedTuple):
@@ -150,7 +162,7 @@ def _distribution(axis: Axes, value: Shown, by: Shown | None) -> None:
 def _curves(axis: Axes, x: Shown, value: Shown, by: Shown | None) -> None:
     """Draw the median over an axis, with a band where rows spread."""
     places, names = x.places
-    values = np.array(value.values, dtype=float)
+    values, has_bands = np.array(value.values, dtype=float), False
     for name, rows, style in _families(value, by):
         here, found = places[rows], values[rows]
         centres, cells = _cells(here)
@@ -158,14 +170,25 @@ def _curves(axis: Axes, x: Shown, value: Shown, by: Shown | None) -> None:
             np.array([_quantile(found[cells == k], share) for k in range(len(centres))])
             for share in (0.5, *BAND)
         )
+        has_bands |= bool((high > low).any())
+        if names:
+            spread = np.array([middle - low, high - middle])
+            colour = style['color']
+            axis.errorbar(centres, middle, spread, label=name, fmt='o', color=colour, capsize=3)
+            continue
         axis.plot(centres, middle, label=name, marker='.', **style)
-        if (high > low).any():
+        if has_bands:
             axis.fill_between(centres, low, high, color=style['color'], alpha=0.15, linewidth=0.0)
     if names:
         axis.set_xticks(range(len(names)), names, rotation=20, ha='right')
+        axis.margins(x=0.2)
+    else:
+        axis.locator_params(axis='x', nbins=TICKS)
     _scale(axis.set_yscale, value)
     axis.set_xlabel(x.label)
     axis.set_ylabel(value.label)
+    if has_bands:
+        axis.set_title(BANDS, fontsize=9)
     _finish(axis, by)
 
 
@@ -173,12 +196,21 @@ def _map(axis: Axes, x: Shown, y: Shown, value: Shown) -> None:
     """Draw the median in the cells of two axes; cells whose rows are all refused are grey."""
     (across, across_names), (up, up_names) = x.places, y.places
     values = np.array(value.values, dtype=float)
+    axis.set_xlabel(x.label)
+    axis.set_ylabel(y.label)
+    axis.locator_params(axis='x', nbins=TICKS)
+    for place, names in ((axis.set_xticks, across_names), (axis.set_yticks, up_names)):
+        if names:
+            place(range(len(names)), names)
     (columns, column), (rows, row) = _cells(across), _cells(up)
     table = np.full((len(rows), len(columns)), np.nan)
     is_met = np.zeros(table.shape, dtype=bool)
     for i, j in set(zip(row.tolist(), column.tolist(), strict=True)):
         is_met[i, j] = True
         table[i, j] = _quantile(values[(row == i) & (column == j)], 0.5)
+    if is_met.mean() < SPARSE:
+        _cloud(axis, columns, rows, np.ma.masked_where(~is_met, table), value.label)
+        return
     drawn = axis.pcolormesh(
         _edges(columns), _edges(rows), table, cmap=MAP, norm=_norm(table), rasterized=True
     )
@@ -190,26 +222,41 @@ def _map(axis: Axes, x: Shown, y: Shown, value: Shown) -> None:
     for set_scale, centres in ((axis.set_xscale, columns), (axis.set_yscale, rows)):
         if _is_geometric(centres):
             set_scale('log')
-    for place, names in ((axis.set_xticks, across_names), (axis.set_yticks, up_names)):
-        if names:
-            place(range(len(names)), names)
-    axis.set_xlabel(x.label)
-    axis.set_ylabel(y.label)
+
+
+def _cloud(
+    axis: Axes, columns: FloatArray, rows: FloatArray, table: np.ma.MaskedArray, label: str
+) -> None:
+    """Draw the median as points where rows meet too few cells for a map; crosses are refused."""
+    up, across = np.nonzero(~np.ma.getmaskarray(table))
+    values = table.data[up, across]
+    known = np.isfinite(values)
+    drawn = axis.scatter(
+        columns[across[known]], rows[up[known]], 25.0, values[known], cmap=MAP, norm=_norm(values)
+    )
+    axis.figure.colorbar(drawn, ax=axis, label=f'{label}, median')
+    if not known.all():
+        axis.plot(columns[across[~known]], rows[up[~known]], 'x', color='gray', markersize=4)
+        axis.set_title('crosses: refused', fontsize=9)
+    axis.grid(alpha=0.3)
 
 
 def _families(
     value: Shown, by: Shown | None
 ) -> Sequence[tuple[str, np.typing.NDArray[np.intp], Mapping[str, Any]]]:
-    """Return name, rows and style of each curve; beyond a dozen, those of equal shares of rows."""
+    """Return name, rows and style of each curve; of many values, some ranges with equal shares."""
     count = len(value.values)
     if by is None:
         return [('', np.arange(count), {'color': COLOURS[0], 'linestyle': '-'})]
     places, names = by.places
     kept = np.unique(places)
     if len(kept) > FAMILY:
-        centres, cells = _cells(places)
-        kept = np.arange(float(min(len(centres), FAMILY)))
-        places, names = np.floor(cells * len(kept) / len(centres)), []
+        edges = np.quantile(places, np.linspace(0.0, 1.0, RANGES + 1))
+        places = np.searchsorted(edges[1:-1], places, side='right').astype(float)
+        kept = np.unique(places)
+        names = [
+            f'{low:.3g} to {high:.3g}' for low, high in zip(edges[:-1], edges[1:], strict=True)
+        ]
     found: list[tuple[str, np.typing.NDArray[np.intp], Mapping[str, Any]]] = []
     for index, place in enumerate(kept.tolist()):
         style = {'color': COLOURS[index % len(COLOURS)], 'linestyle': LINES[index % len(LINES)]}
@@ -223,10 +270,11 @@ def _cells(places: FloatArray) -> tuple[FloatArray, np.typing.NDArray[np.intp]]:
     centres, cells = np.unique(places, return_inverse=True)
     if len(centres) <= FEW:
         return centres, cells
-    edges = np.linspace(places.min(), places.max(), CELLS + 1)
-    return 0.5 * (edges[:-1] + edges[1:]), np.clip(
-        np.searchsorted(edges, places) - 1, 0, CELLS - 1
-    )
+    # Some rows in each cell of a map of two such axes.
+    count = min(MOST_CELLS, int(0.5 * np.sqrt(len(centres))) + 3)
+    edges = np.linspace(places.min(), places.max(), count + 1)
+    inside = np.clip(np.searchsorted(edges, places) - 1, 0, count - 1)
+    return 0.5 * (edges[:-1] + edges[1:]), inside
 
 
 def _edges(centres: FloatArray) -> FloatArray:
