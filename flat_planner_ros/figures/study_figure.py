@@ -19,7 +19,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import FlatPlannerError, FloatArray
 from flat_planner_ros.core.session import Motion
 from flat_planner_ros.core.study import Case
 from flat_planner_ros.figures.file_plot import plt
@@ -48,6 +48,9 @@ SAME = 1e-6
 FEW = 60
 """Different values of an axis up to which each is a place of its own, not a cloud."""
 
+BESIDE = 0.5
+"""Part of the way from one name to the next over which the values of a family spread [-]."""
+
 MOST_CELLS = 30
 """Most parts of an axis into which a cloud is sorted."""
 
@@ -68,6 +71,10 @@ BAND = (0.1, 0.9)
 
 BANDS = 'median, and between which values eight of ten rows lie'
 """What a picture with bands says of them."""
+
+
+class NothingToDraw(FlatPlannerError):
+    """All rows are refused, or have no value."""
 
 
 class Shown(NamedTuple):
@@ -112,6 +119,7 @@ def draw(
 
     """
     figure, axis = plt.subplots(figsize=(7.0, 4.8))
+    value, x, y, by = _placed(value, x, y, by)
     if x is None:
         _distribution(axis, value, by)
     elif y is None:
@@ -121,6 +129,24 @@ def draw(
     figure.tight_layout()
     figure.savefig(path, dpi=150)
     plt.close(figure)
+
+
+def _placed(
+    value: Shown, *axes: Shown | None
+) -> tuple[Shown, Shown | None, Shown | None, Shown | None]:
+    """Return columns without the rows that have no place on an axis, such as refused ones."""
+    given = [axis for axis in axes if axis is not None]
+    found = np.ones(len(value.values), dtype=bool)
+    for axis in given:
+        found &= np.isfinite(axis.places[0])
+    if not found.any():
+        raise NothingToDraw(f'no row has a value of {" and ".join(axis.title for axis in given)}')
+    keep = np.flatnonzero(found).tolist()
+    x, y, by = (
+        None if axis is None else axis._replace(values=[axis.values[row] for row in keep])
+        for axis in axes
+    )
+    return value._replace(values=[value.values[row] for row in keep]), x, y, by
 
 
 def draw_row(case: Case, motion: Motion, path: Path) -> None:
@@ -163,7 +189,8 @@ def _curves(axis: Axes, x: Shown, value: Shown, by: Shown | None) -> None:
     """Draw the median over an axis, with a band where rows spread."""
     places, names = x.places
     values, has_bands = np.array(value.values, dtype=float), False
-    for name, rows, style in _families(value, by):
+    families = _families(value, by)
+    for index, (name, rows, style) in enumerate(families):
         here, found = places[rows], values[rows]
         centres, cells = _cells(here)
         middle, low, high = (
@@ -172,9 +199,9 @@ def _curves(axis: Axes, x: Shown, value: Shown, by: Shown | None) -> None:
         )
         has_bands |= bool((high > low).any())
         if names:
-            spread = np.array([middle - low, high - middle])
-            colour = style['color']
-            axis.errorbar(centres, middle, spread, label=name, fmt='o', color=colour, capsize=3)
+            spread, look = np.array([middle - low, high - middle]), {**style, 'linestyle': ''}
+            beside = centres + BESIDE * ((index + 0.5) / len(families) - 0.5)
+            axis.errorbar(beside, middle, spread, label=name, marker='o', capsize=3, **look)
             continue
         axis.plot(centres, middle, label=name, marker='.', **style)
         if has_bands:
@@ -254,9 +281,8 @@ def _families(
         edges = np.quantile(places, np.linspace(0.0, 1.0, RANGES + 1))
         places = np.searchsorted(edges[1:-1], places, side='right').astype(float)
         kept = np.unique(places)
-        names = [
-            f'{low:.3g} to {high:.3g}' for low, high in zip(edges[:-1], edges[1:], strict=True)
-        ]
+        limits = [f'{edge:.3g}' for edge in edges.tolist()]
+        names = [f'{low} to {high}' for low, high in zip(limits[:-1], limits[1:], strict=True)]
     found: list[tuple[str, np.typing.NDArray[np.intp], Mapping[str, Any]]] = []
     for index, place in enumerate(kept.tolist()):
         style = {'color': COLOURS[index % len(COLOURS)], 'linestyle': LINES[index % len(LINES)]}

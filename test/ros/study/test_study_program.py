@@ -188,6 +188,8 @@ def test_a_row_that_is_refused_says_why(spec, whole, capsys):
         ['x=plant.mismatch.stiffness_scale', 'value=simulated_residual', 'by=strategy'],
         ['x=strategy', 'value=peak_effort', 'by=duration'],
         ['value=residual', 'by=strategy'],
+        ['x=plant.mismatch.stiffness_scale', 'y=rms_effort', 'value=residual'],
+        ['x=duration', 'value=peak_effort', 'by=simulated_residual'],
     ],
 )
 def test_pictures(spec, whole, tmp_path, words):
@@ -235,6 +237,16 @@ def test_a_column_that_is_none_is_named(spec, whole, tmp_path, capsys):
     words = [str(spec), '-o', str(tmp_path / 'whole.csv'), '--no-times', '--plot', 'value=nothing']
     assert study.main(words) == 1
     assert 'there is no column nothing; there are row, strategy' in capsys.readouterr().err
+
+
+def test_refused_rows_have_no_place_on_an_axis_of_results(spec, tmp_path, capsys):
+    pytest.importorskip('matplotlib')
+    words = ['-o', str(tmp_path / 'a.csv'), '-p', 'limits.effort:=[1.0e-5, .inf]', '--plot']
+    assert study.main([str(spec), *words, 'x=duration', 'value=residual']) == 0
+    assert study.main([str(spec), *words, 'x=rms_effort', 'value=residual']) == 1
+    captured = capsys.readouterr()
+    assert 'no row has a value of rms_effort' in captured.err
+    assert 'EFFORT_LIMIT, as row 0: the effort of joint1 reaches' in captured.out
 
 
 def test_parquet_has_the_same_numbers(spec, whole, tmp_path, capsys):
