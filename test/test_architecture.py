@@ -51,6 +51,18 @@ WINGS = {
 }
 """The wings of the core, each with the others from whose public lists it may import."""
 
+NEWER = {
+    *(('typing', name) for name in ('assert_never', 'LiteralString', 'Never', 'NotRequired')),
+    *(('typing', name) for name in ('override', 'Required', 'reveal_type', 'Self', 'Unpack')),
+    *(('enum', name) for name in ('EnumType', 'nonmember', 'ReprEnum', 'StrEnum', 'verify')),
+    *(('math', name) for name in ('cbrt', 'exp2', 'fma', 'sumprod')),
+    ('contextlib', 'chdir'),
+    ('datetime', 'UTC'),
+    ('itertools', 'batched'),
+    ('tomllib', ''),
+}
+"""What the standard library has got since Python 3.10, the oldest that is served."""
+
 MESSAGES_ALLOWED = {
     'conversions.py': 'the one place for messages and core types',
     'joint_states.py': 'the same for joint states, which come in many forms',
@@ -266,6 +278,21 @@ def test_nodes_do_not_import_each_other(node):
 def test_message_packages_have_few_importers(path):
     if not any(path.match(pattern) for pattern in MESSAGES_ALLOWED):
         assert not set(filter(is_message_package, roots(path)))
+
+
+@pytest.mark.parametrize('folder', ['flat_planner_ros', 'test', 'examples', 'docs', 'benchmarks'])
+def test_nothing_is_newer_than_the_oldest_python(folder):
+    for path in sorted((CHECKOUT / folder).rglob('*.py')):
+        # What only a type checker reads may be newer, hence the imports of the module alone.
+        tree = ast.parse(path.read_text('utf-8'))
+        found = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+        names = {(node.module, alias.name) for node in found for alias in node.names}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                names.add((node.value.id, node.attr))
+            if isinstance(node, ast.Import):
+                names.update((alias.name, '') for alias in node.names)
+        assert not names & NEWER, path
 
 
 def test_versions_agree():

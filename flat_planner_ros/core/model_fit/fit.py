@@ -85,7 +85,7 @@ def fit_model(
     Raises
     ------
     InvalidRequest
-        The measurements are of another arm, or too few.
+        The measurements are of another arm, too few, or of one that does not move.
     NotFlat
         The arm of the start is not flat.
 

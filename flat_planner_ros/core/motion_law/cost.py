@@ -23,10 +23,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, InitVar
 from enum import Enum
 from functools import cache
-from typing import Self
+from typing import TYPE_CHECKING
 
 from flat_planner_ros.core.arm import FlatMap, FloatArray, InvalidCost, locked
 import numpy as np
+
+if TYPE_CHECKING:
+    from typing import Self  # Python 3.10 has none
 
 ORDER = 6
 """Highest derivative in the cost; the motion law solves an equation of twice this order."""
@@ -209,7 +212,7 @@ class Strategy(Enum):
 
     squares: tuple[Square, ...]
 
-    def __new__(cls, name: str, *squares: Square) -> Self:
+    def __new__(cls, name: str, *squares: Square) -> 'Self':
         """Return a member whose value is its name."""
         member = object.__new__(cls)
         member._value_ = name

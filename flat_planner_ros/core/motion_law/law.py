@@ -26,12 +26,15 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from math import ceil, log2
-from typing import Protocol, Self
+from typing import Protocol, TYPE_CHECKING
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.term_sum import TermSum
 import numpy as np
 from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from typing import Self  # Python 3.10 has none
 
 JET_ORDER = 6
 """Highest derivative of the planned variable that joint motions and the flat plan need."""
@@ -131,7 +134,7 @@ class ScaledLaw(ABC):
 
         """
 
-    def transformed(self, factor: float, offset: float) -> Self:
+    def transformed(self, factor: float, offset: float) -> 'Self':
         """Return offset + factor times this law."""
         return replace(self, factor=factor * self.factor, offset=offset + factor * self.offset)
 

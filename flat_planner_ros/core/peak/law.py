@@ -16,13 +16,16 @@
 
 from dataclasses import dataclass, replace
 from math import factorial, perm
-from typing import Self
+from typing import TYPE_CHECKING
 
 from flat_planner_ros.core.arm import FloatArray, locked
 from flat_planner_ros.core.motion_law import JET_ORDER
 from flat_planner_ros.core.peak.driven_mode import DrivenMode, ModeState
 import numpy as np
 from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from typing import Self  # Python 3.10 has none
 
 REMAINDER = 1e-17
 """Share of the seventh derivative that the last term of its series may have [-]."""
@@ -62,7 +65,7 @@ class LinearEffortLaw:
         locked(self.series)
 
     @classmethod
-    def of(cls, mode: DrivenMode, start: ModeState, drive: FloatArray, duration: float) -> Self:
+    def of(cls, mode: DrivenMode, start: ModeState, drive: FloatArray, duration: float) -> 'Self':
         """
         Return the law of even samples of a drive.
 
@@ -99,7 +102,7 @@ class LinearEffortLaw:
         scales = [step**k / factorial(k) for k in range(degree + 1)]
         return cls(duration=duration, series=derivatives * np.array(scales)[:, None])
 
-    def transformed(self, factor: float, offset: float) -> Self:
+    def transformed(self, factor: float, offset: float) -> 'Self':
         """Return offset + factor times this law."""
         return replace(self, factor=factor * self.factor, offset=offset + factor * self.offset)
 

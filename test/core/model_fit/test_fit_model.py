@@ -14,6 +14,7 @@
 
 """The whole model from one recording: how near it comes, what it admits, what it refuses."""
 
+from dataclasses import replace
 from math import pi
 
 from flat_planner_ros.core.arm import displaced_com, InvalidRequest, PlanarArm
@@ -205,6 +206,8 @@ def test_what_tells_nothing_is_refused():
             ),
             BELIEVED,
         )
+    with pytest.raises(InvalidRequest, match='no joint moves'):
+        fit_model(replace(seen, positions=0.0 * seen.positions), BELIEVED)
     with pytest.raises(InvalidRequest, match='fewest'):
         Measurements(times=seen.times[:9], positions=seen.positions[:9], efforts=seen.efforts[:9])
     with pytest.raises(InvalidRequest, match='increase'):
