@@ -159,7 +159,7 @@ def _result(
     for segment, part in zip(observed.segments, around.residuals, strict=True):
         residuals[segment.first : segment.last] = part
     noise = noise_of_links(measurements)
-    explained = np.hypot(noise, last.by_base)
+    explained = np.hypot(noise, last.by_inputs)
     doubts = [doubt(around, last.found.spread, explained, observed.angles.std(axis=0))]
     if first is not None:
         doubts.append(first.misfit)

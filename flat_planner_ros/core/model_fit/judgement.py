@@ -36,7 +36,7 @@ REGULAR_EXCESS = 1.08
 """Regular residual relative to the noise from which the structure is in doubt [-]."""
 
 MODEL_FLOOR = 1e-4
-"""Residual that simulation and interpolation leave, relative to the motion's spread [-]."""
+"""Residual that a simulation always leaves, relative to the motion's spread [-]."""
 
 
 def correlation_length(residuals: Sequence[FloatArray]) -> float:
@@ -113,7 +113,8 @@ def doubt(around: Linearisation, spread: FloatArray, noise: FloatArray, motion: 
     around
         The last linearisation.
     spread, noise
-        Root mean square of the residual and of the noise of either channel, shape (2,) [rad].
+        Root mean square of the residual of either channel, and of what noise and inputs explain of
+        it, shape (2,) [rad].
     motion
         Root mean square of the motion of either channel, shape (2,) [rad].
 
@@ -126,7 +127,7 @@ def doubt(around: Linearisation, spread: FloatArray, noise: FloatArray, motion: 
         ratio = float(spread[channel]) / allowed
         if ratio > EXCESS or (ratio > REGULAR_EXCESS and length > REGULAR):
             found.append(
-                f'{names[channel]} is {spread[channel]:.2g} rad off where noise is '
-                f'{noise[channel]:.2g} rad, {length:.0f} samples in a row alike'
+                f'{names[channel]} is {spread[channel]:.2g} rad off where noise and what happens '
+                f'between samples explain {allowed:.2g} rad, {length:.0f} samples in a row alike'
             )
     return '; '.join(found)

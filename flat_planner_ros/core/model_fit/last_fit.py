@@ -34,9 +34,16 @@ from flat_planner_ros.core.model_fit.last_links import (
     VISCOUS,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
-from flat_planner_ros.core.model_fit.observation import base_rate, noise_of_links, observed_of
+from flat_planner_ros.core.model_fit.observation import (
+    base_rate,
+    noise_of_links,
+    observed_of,
+    with_half_the_efforts,
+)
 from flat_planner_ros.core.model_fit.refinement import (
+    CHANNELS,
     first_starts,
+    Linearisation,
     linearised,
     Observed,
     refine,
@@ -85,8 +92,9 @@ class LastFit(NamedTuple):
         Covariance of all, zero for those that are not told, shape (8, 8).
     imbalance
         Of the last link; None where it was not looked for, or nothing tells it.
-    by_base
-        What the noise of the velocity of link n-2 does to either angle, shape (2,) [rad].
+    by_inputs
+        What the effort between samples, the integration and the noise of the velocity of link n-2
+        may do to either angle that no parameter takes away, shape (2,) [rad].
 
     """
 
@@ -95,7 +103,7 @@ class LastFit(NamedTuple):
     free: list[int]
     errors: FloatArray
     imbalance: ImbalanceEstimate | None
-    by_base: FloatArray
+    by_inputs: FloatArray
 
 
 def fit_last_links(
@@ -115,15 +123,15 @@ def fit_last_links(
         imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
         other = (other[0] if observed is former else former, other[1])
     doubtful = [(other[1], other[0])]
-    # The integration is of second order: twice the step adds three times the error.
+    # Both are of second order, efforts with corners: twice the step adds three times the error.
     doubtful.append((1 / 3, replace(observed, refinement=observed.refinement / 2)))
+    doubtful.append((1 / 3, with_half_the_efforts(observed)))
     if observed.base.any():
         for factor in (SHORTER, LONGER):
             base = base_rate(measurements, period, factor)
             doubtful.append((1.0, replace(observed, base=base)))
-    errors, changes = _errors(doubtful, found, free, scales)
-    by_base = np.linalg.norm([np.zeros(2), *changes[2:]], axis=0)
-    return LastFit(observed, found, free, errors, imbalance, by_base)
+    errors, by_inputs = _errors(doubtful, found, free, scales)
+    return LastFit(observed, found, free, errors, imbalance, by_inputs)
 
 
 def _guesses(
@@ -206,23 +214,33 @@ def _errors(
     found: Refined,
     free: list[int],
     scales: FloatArray,
-) -> tuple[FloatArray, list[FloatArray]]:
+) -> tuple[FloatArray, FloatArray]:
     """
     Return the covariance (8, 8) of the parameters, of noise and of what is doubtful.
 
-    For each doubtful way to see the recording, with the share of its difference that counts, also
-    by how much the residuals differ, shape (2,) [rad].
+    For the doubtful ways to see the recording, each with the share of its difference that counts,
+    also what they leave that no step of the parameters takes away, shape (2,) [rad].
     """
     size = np.outer(scales[free], scales[free])
     inside = covariance(found.around, scales[free]) * size
-    here, changes = np.concatenate(found.around.residuals), []
+    left = np.zeros(CHANNELS)
     for weight, changed in doubtful:
         there = linearised(changed, found.parameters, found.starts, free, scales, found.spread)
         normal = there.normal.sum(axis=0) * size + np.eye(len(free)) * 1e-12
         change = there.gradient - found.around.gradient
-        moved = weight * scales[free] * np.linalg.solve(normal, scales[free] * change)
-        inside += np.outer(moved, moved)
-        changes.append(np.sqrt(np.mean((np.concatenate(there.residuals) - here) ** 2, axis=0)))
+        moved = -scales[free] * np.linalg.solve(normal, scales[free] * change.sum(axis=0))
+        inside += weight**2 * np.outer(moved, moved)
+        left += (weight * found.spread) ** 2 * _left(there, found.around, moved, found.spread)
     whole = np.zeros((len(NAMES), len(NAMES)))
     whole[np.ix_(free, free)] = inside
-    return whole, changes
+    return whole, np.sqrt(left)
+
+
+def _left(
+    there: Linearisation, here: Linearisation, moved: FloatArray, spread: FloatArray
+) -> FloatArray:
+    """Return the mean square by which residuals differ after a step, weighted, shape (2,) [-]."""
+    each = (np.concatenate(there.residuals) - np.concatenate(here.residuals)) / spread
+    by_step = 2.0 * (there.gradient - here.gradient) @ moved + moved @ there.normal @ moved
+    result: FloatArray = np.maximum((each**2).sum(axis=0) + by_step, 0.0) / len(each)
+    return result

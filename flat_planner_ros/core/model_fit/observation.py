@@ -14,6 +14,7 @@
 
 """A recording of the last two links as the fit sees it, and the size of what it looks for."""
 
+from dataclasses import replace
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
@@ -26,6 +27,7 @@ from flat_planner_ros.core.model_fit.measurements import (
 )
 from flat_planner_ros.core.model_fit.refinement import Observed
 from flat_planner_ros.core.model_fit.signals import (
+    between,
     derivatives,
     FEWEST,
     rate_noise,
@@ -105,6 +107,20 @@ def _still_at_rest(rate: FloatArray, bound: float, samples: int) -> FloatArray:
     padded = np.pad(alone.astype(float), samples)
     result: FloatArray = np.where(np.convolve(padded, near, mode='valid') > 0.0, 0.0, rate)
     return result
+
+
+def with_half_the_efforts(observed: Observed) -> Observed:
+    """Return a recording in which every other effort is interpolated between its neighbours."""
+    effort, times = observed.effort.copy(), observed.times
+    known, lost = slice(None, None, 2), slice(1, None, 2)
+    interpolated = np.interp if observed.is_linear else _on_cubics
+    effort[lost] = interpolated(times[lost], times[known], effort[known])
+    return replace(observed, effort=effort)
+
+
+def _on_cubics(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+    """Return samples interpolated as `between` does, the arguments in NumPy's order."""
+    return between(times, values, at)
 
 
 def noise_of_links(measurements: Measurements) -> FloatArray:

@@ -131,7 +131,7 @@ class Linearisation(NamedTuple):
     cost
         Weighted sum of squares that is left with the best starts [-].
     gradient
-        Shape (free,).
+        By either channel, shape (2, free).
     normal
         Normal equations of either channel, shape (2, free, free).
     scatter
@@ -198,7 +198,8 @@ def linearised(
 
     """
     count = len(free)
-    cost, gradient, normal = 0.0, np.zeros(count), np.zeros((CHANNELS, count, count))
+    cost, gradient = 0.0, np.zeros((CHANNELS, count))
+    normal = np.zeros((CHANNELS, count, count))
     scatter, rounding = np.zeros((count, count)), np.zeros((count, count))
     residuals, corrections = [], []
     pieces = _segments(observed, model, starts, free, scales)
@@ -209,9 +210,9 @@ def linearised(
         inside, inside_columns = basis.T @ weighted, basis.T @ columns
         left, left_columns = weighted - basis @ inside, columns - basis @ inside_columns
         cost += float(left @ left)
-        gradient += left_columns.T @ left
         for channel in range(CHANNELS):
             own = left_columns[channel::CHANNELS]
+            gradient[channel] += own.T @ left[channel::CHANNELS]
             normal[channel] += own.T @ own
             moves = observed.moves[segment.first : segment.last, channel]
             share = observed.rounding[channel] / spread[channel]
@@ -282,7 +283,8 @@ def _step(around: Linearisation, damping: float, scales: FloatArray) -> FloatArr
     """Return the step of the free parameters, damped by Marquardt's parameter."""
     normal = around.normal.sum(axis=0) * np.outer(scales, scales)
     normal += damping * np.diag(np.diag(normal))
-    step: FloatArray = -scales * np.linalg.lstsq(normal, scales * around.gradient, rcond=NULL)[0]
+    gradient = scales * around.gradient.sum(axis=0)
+    step: FloatArray = -scales * np.linalg.lstsq(normal, gradient, rcond=NULL)[0]
     return step
 
 

@@ -166,6 +166,26 @@ def test_another_structure_is_noticed(spring):
     assert fit.misfit in fit.text
 
 
+def ramps(t):
+    """Return an effort with corners that 50 samples a second do not show [N m]."""
+    corners = [0.113, 0.357, 0.605, 0.851, 1.613, 1.857, 2.105, 2.351]
+    return np.interp(np.mod(t, 3.0), corners, [0.0, 0.01, -0.01, 0.0, 0.0, -0.01, 0.01, 0.0])
+
+
+@pytest.mark.parametrize(
+    'spring',
+    [linear, lambda q, v: linear(q - np.clip(q, -0.005, 0.005), v)],
+    ids=['as modelled', 'backlash of 5 mrad'],
+)
+def test_corners_of_the_effort_between_samples_are_no_misfit(spring):
+    """Of 0.04 mrad without noise; backlash leaves 2 mrad."""
+    seen = measured(ramps, np.arange(0.0, 6.0, 0.02), spring=spring, **FREE)
+    fit = fit_model(seen, BELIEVED)
+    assert bool(fit.misfit) == (spring is not linear)
+    if spring is linear:
+        assert six(fit.arm)[:4] == pytest.approx([7e-4, 3e-5, STIFFNESS, DAMPING], rel=0.004)
+
+
 def test_an_imbalance_is_noticed_and_found():
     links = {
         'link_length': [0.1, 0.1],
