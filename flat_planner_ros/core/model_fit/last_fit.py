@@ -16,7 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import pi
+from math import pi, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
@@ -39,6 +39,7 @@ from flat_planner_ros.core.model_fit.observation import (
     noise_of_links,
     observed_of,
     with_half_the_efforts,
+    with_other_times,
 )
 from flat_planner_ros.core.model_fit.refinement import (
     CHANNELS,
@@ -72,6 +73,12 @@ UNDECIDED, DECIDED = 0.5, 0.1
 SHORTER, LONGER = 0.6, 1.6
 """Factors on the span of smoothed velocities, what comes of which shows what they cost [-]."""
 
+HELD_TIMES = 4
+"""Draws of the unknown times at which held efforts began to act [-]."""
+
+COVER = 2.0
+"""Factor on what these times do to residuals: a slow drift of which one draw is seen [-]."""
+
 GIVEN_UP_FIRST = (DELAY, COULOMB, VISCOUS, OFFSET, LAST, BOTH, DAMPING, STIFFNESS)
 """Of parameters that only together are told, the one that is kept at its start value."""
 
@@ -93,8 +100,8 @@ class LastFit(NamedTuple):
     imbalance
         Of the last link; None where it was not looked for, or nothing tells it.
     by_inputs
-        What the effort between samples, the integration and the noise of the velocity of link n-2
-        may do to either angle that no parameter takes away, shape (2,) [rad].
+        What the effort between samples and its time, the integration and the noise of the velocity
+        of link n-2 may do to either angle that no parameter takes away, shape (2,) [rad].
 
     """
 
@@ -122,14 +129,17 @@ def fit_last_links(
         former = observed
         imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
         other = (other[0] if observed is former else former, other[1])
-    doubtful = [(other[1], other[0])]
+    doubtful = [_Doubt(other[1], other[0])]
     # Both are of second order, efforts with corners: twice the step adds three times the error.
-    doubtful.append((1 / 3, replace(observed, refinement=observed.refinement / 2)))
-    doubtful.append((1 / 3, with_half_the_efforts(observed)))
+    doubtful.append(_Doubt(1 / 3, replace(observed, refinement=observed.refinement / 2)))
+    doubtful.append(_Doubt(1 / 3, with_half_the_efforts(observed)))
     if observed.base.any():
         for factor in (SHORTER, LONGER):
             base = base_rate(measurements, period, factor)
-            doubtful.append((1.0, replace(observed, base=base)))
+            doubtful.append(_Doubt(1.0, replace(observed, base=base)))
+    if measurements.are_held:
+        draws = (with_other_times(observed, seed) for seed in range(HELD_TIMES))
+        doubtful += [_Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER) for draw in draws]
     errors, by_inputs = _errors(doubtful, found, free, scales)
     return LastFit(observed, found, free, errors, imbalance, by_inputs)
 
@@ -209,8 +219,28 @@ def _told(
         found = refine(observed, parameters, free, scales, found.spread, found.starts)
 
 
+class _Doubt(NamedTuple):
+    """
+    Another way to see the recording.
+
+    Attributes
+    ----------
+    weight
+        Share of the difference that it makes which counts [-].
+    changed
+        The recording in that way.
+    cover
+        Factor on what it may leave in the residuals [-].
+
+    """
+
+    weight: float
+    changed: Observed
+    cover: float = 1.0
+
+
 def _errors(
-    doubtful: Sequence[tuple[float, Observed]],
+    doubtful: Sequence[_Doubt],
     found: Refined,
     free: list[int],
     scales: FloatArray,
@@ -224,13 +254,15 @@ def _errors(
     size = np.outer(scales[free], scales[free])
     inside = covariance(found.around, scales[free]) * size
     left = np.zeros(CHANNELS)
-    for weight, changed in doubtful:
+    for weight, changed, cover in doubtful:
         there = linearised(changed, found.parameters, found.starts, free, scales, found.spread)
         normal = there.normal.sum(axis=0) * size + np.eye(len(free)) * 1e-12
         change = there.gradient - found.around.gradient
         moved = -scales[free] * np.linalg.solve(normal, scales[free] * change.sum(axis=0))
         inside += weight**2 * np.outer(moved, moved)
-        left += (weight * found.spread) ** 2 * _left(there, found.around, moved, found.spread)
+        left += (cover * weight * found.spread) ** 2 * _left(
+            there, found.around, moved, found.spread
+        )
     whole = np.zeros((len(NAMES), len(NAMES)))
     whole[np.ix_(free, free)] = inside
     return whole, np.sqrt(left)

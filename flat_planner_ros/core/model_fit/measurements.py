@@ -45,6 +45,9 @@ class Measurements:
         Joint angles, shape (m, n) [rad].
     efforts
         Efforts of the actuated joints, shape (m, n-1) [N m].
+    are_held
+        Whether each effort is held until the next one, which begins to act at a time between two
+        samples that nobody knows: those of a feedback, as the tracker's.
 
     Raises
     ------
@@ -56,6 +59,7 @@ class Measurements:
     times: FloatArray
     positions: FloatArray
     efforts: FloatArray
+    are_held: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what tells nothing, and lock the arrays."""

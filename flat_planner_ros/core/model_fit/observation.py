@@ -15,6 +15,7 @@
 """A recording of the last two links as the fit sees it, and the size of what it looks for."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
@@ -43,6 +44,12 @@ SMOOTHING = 0.15
 """Span of the polynomials that smooth velocities, in free periods [-]."""
 
 
+SUDDEN = 0.3
+"""Change of a held effort from sample to sample that is sudden, relative to the largest [-]."""
+
+FEW = 0.02
+"""Share of samples with such changes beyond which they are the rule [-]."""
+
 QUIET = 4.0
 """Velocity of link n-2 relative to its noise below which it counts as rest [-]."""
 
@@ -55,7 +62,8 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
     span = max(SMOOTHING * period, FEWEST * measurements.period)
     _, rates, accelerations = derivatives(times, angles, span)
     base = base_rate(measurements, period)
-    segments = segments_of(times, measurements.period, SEGMENT * period)
+    cuts = sudden_changes(measurements.efforts[:, -1]) if measurements.are_held else []
+    segments = segments_of(times, measurements.period, SEGMENT * period, cuts)
     if not segments:
         raise InvalidRequest('the measurements have no stretch without gaps')
     shown = np.column_stack((angles[:, -2], measurements.positions[:, -1]))
@@ -121,6 +129,47 @@ def with_half_the_efforts(observed: Observed) -> Observed:
 def _on_cubics(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
     """Return samples interpolated as `between` does, the arguments in NumPy's order."""
     return between(times, values, at)
+
+
+def with_other_times(observed: Observed, seed: int) -> Observed:
+    """
+    Return efforts that began to act at other times between the same samples.
+
+    Parameters
+    ----------
+    observed
+        The recording.
+    seed
+        Of the times, each as likely as any other between its two samples.
+
+    """
+    earlier = np.random.default_rng(seed).uniform(-0.5, 0.5, observed.effort.size - 1)
+    for before, after in pairwise(observed.segments):
+        earlier[before.last - 1 : after.first] = 0.0
+    # Half of the impulse that is gained or lost goes to either end: what interpolates keeps it.
+    gained = 0.5 * earlier * np.diff(observed.effort)
+    return replace(observed, effort=observed.effort + np.append(gained, 0) + np.append(0, gained))
+
+
+def sudden_changes(effort: FloatArray) -> list[int]:
+    """
+    Return the samples around changes of a held effort that are too large not to know their time.
+
+    Parameters
+    ----------
+    effort
+        Shape (m,) [N m].
+
+    Returns
+    -------
+    list of int
+        Where pieces are cut, the samples next to a change left out: none if there are many.
+
+    """
+    changes = np.flatnonzero(np.abs(np.diff(effort)) > SUDDEN * np.abs(effort).max())
+    if changes.size > FEW * effort.size:
+        return []
+    return sorted({int(change) + place for change in changes for place in range(3)})
 
 
 def noise_of_links(measurements: Measurements) -> FloatArray:

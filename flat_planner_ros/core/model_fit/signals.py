@@ -14,6 +14,7 @@
 
 """Signals between their samples, smoothed derivatives, and pieces of a recording."""
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple
@@ -44,9 +45,11 @@ class Segment(NamedTuple):
     last: int
 
 
-def segments_of(times: FloatArray, period: float, longest: float) -> list[Segment]:
+def segments_of(
+    times: FloatArray, period: float, longest: float, cuts: Sequence[int] = ()
+) -> list[Segment]:
     """
-    Return even pieces of a recording, none longer than asked, none across a gap.
+    Return even pieces of a recording, none longer than asked, none across a gap or cut.
 
     Parameters
     ----------
@@ -56,14 +59,23 @@ def segments_of(times: FloatArray, period: float, longest: float) -> list[Segmen
         Usual time between two of them [s].
     longest
         Bound on the time that a piece spans [s].
+    cuts
+        Samples at which a piece begins in any case, ascending.
 
     """
     pieces = []
-    for first, last in stretches(times, period):
+    for first, last in _cut(stretches(times, period), cuts):
         count = max(1, round(float(times[last - 1] - times[first]) / longest))
-        cuts = np.linspace(first, last, count + 1).astype(int)
-        pieces += [Segment(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        ends = np.linspace(first, last, count + 1).astype(int).tolist()
+        pieces += [Segment(*each) for each in pairwise(ends)]
     return [piece for piece in pieces if piece.last - piece.first >= SHORTEST]
+
+
+def _cut(pieces: Sequence[Segment], cuts: Sequence[int]) -> Iterator[Segment]:
+    """Yield what cuts leave of pieces."""
+    for first, last in pieces:
+        inside = [cut for cut in cuts if first < cut < last]
+        yield from (Segment(*ends) for ends in pairwise([first, *inside, last]))
 
 
 def stretches(times: FloatArray, period: float) -> list[Segment]:

@@ -103,7 +103,12 @@ class ModelEstimate:
 
 
 def estimate_model(
-    times: FloatArray, positions: FloatArray, efforts: FloatArray, arm: PlanarArm
+    times: FloatArray,
+    positions: FloatArray,
+    efforts: FloatArray,
+    arm: PlanarArm,
+    *,
+    are_held: bool = False,
 ) -> ModelEstimate:
     """
     Fit the model to the samples of one motion and of the time after it.
@@ -116,6 +121,8 @@ def estimate_model(
         Of all joints, shape (m, n) [rad], [N m]; samples with an unknown effort are left out.
     arm
         The model as believed.
+    are_held
+        Whether efforts are those of a feedback, as of `Measurements`.
 
     """
     known = np.isfinite(efforts[:, :-1]).all(axis=1)
@@ -123,7 +130,10 @@ def estimate_model(
         return ModelEstimate(reason='the efforts of the motors are not measured')
     try:
         measurements = Measurements(
-            times=times[known], positions=positions[known], efforts=efforts[known, :-1]
+            times=times[known],
+            positions=positions[known],
+            efforts=efforts[known, :-1],
+            are_held=are_held,
         )
         fit = fit_model(measurements, arm)
     except (FlatPlannerError, np.linalg.LinAlgError) as error:

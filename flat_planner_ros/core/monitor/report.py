@@ -24,7 +24,7 @@ from flat_planner_ros.core.monitor.doubtful_samples import doubt_of_times, seen_
 from flat_planner_ros.core.monitor.feedback_times import FeedbackTimes
 from flat_planner_ros.core.monitor.identification import identify, StiffnessEstimate
 from flat_planner_ros.core.monitor.model_estimate import estimate_model, ModelEstimate
-from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Record
+from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion
 from flat_planner_ros.core.monitor.oscillation import OscillationFit
 from flat_planner_ros.core.monitor.settings import Level, MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import SampleClock
@@ -186,7 +186,8 @@ def assess(
         estimate = None if settings.arm is None else StiffnessEstimate(reason=DAMPED)
     else:
         estimate = _estimate(times - done.end, errors, fit, settings)
-    model = _model(done, measured.motors, until, settings, doubt)
+    motors = measured.motors.between(done.start, until)
+    model = _model(done, motors, settings, doubt, is_tracked=is_tracked)
     frequency = fit.frequency or settings.expected_frequency
     settling = _settling_time(times - done.end, errors[:, -1], settings.settling_band, frequency)
     window = float(times[-1]) - done.end if times.size else 0.0
@@ -217,8 +218,7 @@ def assess(
     severity = Level.worst(
         (arrival.level, _level(fit, settings), Level.WARN if foreign or clipped else Level.OK)
     )
-    tracked = TRACKED if is_tracked else ''
-    said = (clock.remark(course), arrival.remark, clipped, foreign, tracked)
+    said = clock.remark(course), arrival.remark, clipped, foreign, TRACKED if is_tracked else ''
     sentence = (*said, _verdict(fit, judged), *remarks)
     return VibrationReport(
         level=Level.STALE if stale else severity,
@@ -265,7 +265,12 @@ def _estimate(
 
 
 def _model(
-    motion: PlannedMotion, motors: Record, until: float, settings: MonitorSettings, doubt: str
+    motion: PlannedMotion,
+    seen: tuple[FloatArray, FloatArray],
+    settings: MonitorSettings,
+    doubt: str,
+    *,
+    is_tracked: bool,
 ) -> ModelEstimate | None:
     """Return the whole model if it is asked for and the joints are the model's."""
     arm, joints = settings.arm, len(motion.joint_names)
@@ -273,8 +278,9 @@ def _model(
         return None
     if doubt:
         return ModelEstimate(reason=doubt)
-    times, rows = motors.between(motion.start, until)
-    return estimate_model(times - motion.start, rows[:, :joints], rows[:, joints:], arm)
+    times, rows = seen
+    angles, efforts = np.hsplit(rows, 2)
+    return estimate_model(times - motion.start, angles, efforts, arm, are_held=is_tracked)
 
 
 def _missed(

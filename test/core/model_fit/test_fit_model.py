@@ -45,6 +45,11 @@ def linear(q, rate):
     return STIFFNESS * q + DAMPING * rate
 
 
+def backlash(q, rate):
+    """Return the effort of one with 5 mrad of backlash [N m]."""
+    return linear(q - np.clip(q, -0.005, 0.005), rate)
+
+
 def six(arm):
     """Return what the last two links of an arm depend on, shape (6,)."""
     friction = arm.viscous_friction[-1], arm.coulomb_friction[-1]
@@ -156,7 +161,7 @@ def test_trusted_inertia_gives_the_scale_of_the_effort():
     [
         linear,
         lambda q, v: linear(q * (1.0 + 0.05 * (q / 0.3) ** 2), v),
-        lambda q, v: linear(q - np.clip(q, -0.005, 0.005), v),
+        backlash,
     ],
     ids=['as modelled', 'stiffens by 5 % at 0.3 rad', 'backlash of 5 mrad'],
 )
@@ -174,7 +179,7 @@ def ramps(t):
 
 @pytest.mark.parametrize(
     'spring',
-    [linear, lambda q, v: linear(q - np.clip(q, -0.005, 0.005), v)],
+    [linear, backlash],
     ids=['as modelled', 'backlash of 5 mrad'],
 )
 def test_corners_of_the_effort_between_samples_are_no_misfit(spring):
@@ -184,6 +189,34 @@ def test_corners_of_the_effort_between_samples_are_no_misfit(spring):
     assert bool(fit.misfit) == (spring is not linear)
     if spring is linear:
         assert six(fit.arm)[:4] == pytest.approx([7e-4, 3e-5, STIFFNESS, DAMPING], rel=0.004)
+
+
+@pytest.mark.parametrize('spring', [linear, backlash], ids=['no', 'yes'])
+def test_another_structure_is_told_from_efforts_at_unknown_times(spring):
+    """
+    Each is held until the next one, which begins to act anywhere between two samples.
+
+    Once none comes for a quarter of a second; where that ends is what would err most.
+    """
+    times = np.arange(0.0, 2.0, 0.01)
+    begins = times[:-1] + 0.01 * np.random.default_rng(1).uniform(size=times.size - 1)
+    sent = pushes(times)
+    sent[25:50] = sent[25]
+
+    def in_steps(t):
+        return sent[np.searchsorted(begins, t)]
+
+    seen = measured(in_steps, times, spring=spring, noise=1e-4, **FREE)
+    fit = fit_model(replace(seen, are_held=True), BELIEVED)
+    if spring is linear:
+        assert fit_model(seen, BELIEVED).misfit != ''
+        assert fit.misfit == ''
+        stds = np.array([estimate.std for estimate in fit.estimates[:4]])
+        errors = six(fit.arm)[:4] - [*FREE.values(), STIFFNESS, DAMPING]
+        assert np.abs(errors / stds).max() < 4.0
+        assert (stds < 0.006 * six(fit.arm)[:4]).all()
+    else:
+        assert 'passive joint' in fit.misfit
 
 
 def test_an_imbalance_is_noticed_and_found():
