@@ -15,7 +15,7 @@
 """A swinging arm through the nodes: a goal catches it, and so does ~/settle."""
 
 from core.conftest import ARM, envelope
-from ros.rig import Suite
+from ros.rig import stamp, Suite
 from std_srvs.srv import Trigger
 
 SWING = 0.3
@@ -24,16 +24,21 @@ SWING = 0.3
 LET_GO = 0.44
 """Angle of the passive joint at the start [rad]."""
 
+ONE_SWING = 0.8
+"""Time of more than one period, in which the planner sees what is left [s]."""
+
 SLOWLY = {'speed': 0.5, 'window': 1.0}
 
 
 class Swinging(Suite):
     """The three nodes, and an arm that has swung for one and a half periods."""
 
-    def __init__(self, graph, planner=None):
-        """Let it go."""
+    def __init__(self, graph, planner=None, spring=1.0):
+        """Let it go; stiffness and damping are other than believed by a factor."""
         quick = {'replan.lookahead': 0.2, **(planner or {})}
         noisy = {'initial_position': [0.0, LET_GO], 'noise.position_std': 1e-4}
+        noisy |= {'mismatch.stiffness_scale': spring, 'mismatch.damping_scale': spring}
+        self.true = ARM.scaled(stiffness=spring, damping=spring)
         super().__init__(graph, quick, noisy, **SLOWLY)
         self.wait_until(2.0)
         assert self.amplitude > SWING
@@ -42,7 +47,7 @@ class Swinging(Suite):
     def amplitude(self):
         """Return what the passive joint swings by now, from the true velocity [rad]."""
         state = self.states[-1]
-        return envelope(ARM, state.position[1], state.velocity[1])
+        return envelope(self.true, state.position[1], state.velocity[1])
 
 
 def test_a_goal_catches_a_swinging_arm(graph):
@@ -53,6 +58,17 @@ def test_a_goal_catches_a_swinging_arm(graph):
     arm.wait_until(float(verdict['start_time']) + 0.7 + 0.02)
     assert arm.amplitude < 0.01 * SWING
     assert abs(arm.states[-1].position[0] - 1.0) < 0.01
+
+
+def test_two_calls_settle_an_arm_that_is_softer_than_believed(graph):
+    arm = Swinging(graph, spring=0.9)
+    before = arm.amplitude
+    for calls, share in ((1, 0.15), (2, 0.03)):
+        response = graph.call(Trigger, '/flat_planner/settle')
+        assert response.success, response.message
+        graph.expect(lambda count=calls: len(arm.verdicts('STOPPED')) == count, 'the end')
+        arm.wait_until(stamp(arm.states[-1]) + ONE_SWING)
+        assert arm.amplitude < share * before
 
 
 def test_settle_ends_a_swing_and_then_has_nothing_to_do(graph):
