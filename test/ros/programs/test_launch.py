@@ -212,6 +212,12 @@ def test_a_tracker_closes_the_loop_where_it_is_wanted(launched):
     assert rules['~/effort_commands'] == 'flat_tracker/effort_commands'
 
 
+def test_a_tracker_beside_an_action_is_refused(launched):
+    arguments = 'tracker:=true', 'command_action:=flat_arm_controller/follow_joint_trajectory'
+    with pytest.raises(AssertionError, match='command_action and tracker exclude each other'):
+        launched.run('planner.launch.py', *arguments, names=['flat_planner'])
+
+
 @pytest.mark.parametrize('launched', [VIEWERS], indirect=True, ids=['viewers'])
 def test_arm_and_ghost_are_described_where_ros_has_the_programs(launched):
     publishers = ['robot_state_publisher', 'ghost_state_publisher']
