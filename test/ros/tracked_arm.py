@@ -27,12 +27,6 @@ from std_msgs.msg import Float64MultiArray
 EFFORTS = '/flat_tracker/effort_commands'
 ELDER = 'another tracker moves this arm and was started before'
 
-UNSEEN = 'command ignored: no joint sample for inf s'
-"""What a tracker says that hears a command before it has heard of the arm."""
-
-NOT_MOVED = 'was not carried out'
-"""What the planner says of a motion that nobody played."""
-
 PLANT = {
     'input': 'tracker',
     'publish_rate': 500.0,
@@ -69,33 +63,6 @@ class Tracked(Rig):
         known = self._trackers()
         self.tracker = self.graph.start('tracker_node', *arguments({**TRACKER, **given}))
         self.graph.expect(lambda: self._trackers() - known, 'a tracker')
-
-    def move(self, positions, duration=1.0):
-        """Send a goal, and again where a tracker that has just started let the command pass."""
-        while True:
-            verdict, is_let_pass = self._try_to_move(positions, duration)
-            if not is_let_pass:
-                return verdict
-
-    def _try_to_move(self, positions, duration):
-        """Send a goal; return its verdict, and whether a tracker let pass what nobody played."""
-        place = self.states[-1].position[0]
-        ignored, missed = (len(self.graph.logged(text)) for text in (UNSEEN, NOT_MOVED))
-        verdict = super().move(positions, duration)
-
-        def is_missed():
-            return len(self.graph.logged(NOT_MOVED)) > missed
-
-        def is_ignored():
-            return len(self.graph.logged(UNSEEN)) > ignored
-
-        def is_over():
-            return is_missed() or abs(self.states[-1].position[0] - place) > 1e-3
-
-        self.graph.spin_until(lambda: is_ignored() or is_over())
-        if is_ignored():
-            self.graph.spin_until(is_over)
-        return verdict, is_ignored() and is_missed()
 
     def _trackers(self):
         """Return the ends of the trackers that commands are sent to."""

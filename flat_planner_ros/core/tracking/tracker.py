@@ -93,6 +93,8 @@ class Tracker:
         """
         Follow a motion from its start on, in the place of the present one.
 
+        Until that start joint samples may be missing; if they still are, it is not begun.
+
         Raises
         ------
         InvalidCommand
@@ -106,11 +108,9 @@ class Tracker:
             )
         if motion.end <= now:
             raise InvalidCommand(f'the motion ended {now - motion.end:.3f} s ago')
-        if now - self._heard > self._settings.timeout:
-            raise InvalidCommand(
-                f'no joint sample for {now - self._heard:.3g} s, the timeout is '
-                f'{self._settings.timeout:g} s: the motion is not begun'
-            )
+        is_due = self.phase is Phase.TRACKING or motion.start <= now + self._settings.delay
+        if is_due and now - self._heard > self._settings.timeout:
+            raise InvalidCommand(self._unseen(now))
         if self.ages.mean > self._max_age:
             raise InvalidCommand(f'{self._lateness}: the motion is not begun')
         self.ages.restart()
@@ -197,12 +197,19 @@ class Tracker:
             'lower bandwidth, or see what keeps this machine busy or its clock apart'
         )
 
+    def _unseen(self, now: float) -> str:
+        """Return in words that joint samples are missing, and what follows."""
+        silent = now - self._heard
+        missing = f'no joint sample for {silent:.3g} s' if silent < inf else 'no joint sample yet'
+        return f'{missing}, the timeout is {self._settings.timeout:g} s: the motion is not begun'
+
     def _measure(self, sample: JointSample, now: float) -> None:
         """Correct the estimate, or start it anew where it has nothing to do with the sample."""
         limit, gap = self._settings.jump, sample.time - self._heard
         self._heard = sample.time
         if not 0.0 < gap <= self._settings.timeout:
-            self._give_up(now, f'no joint sample for {gap:.3g} s')
+            if gap <= 0.0 or not self._waits(now):
+                self._give_up(now, f'no joint sample for {gap:.3g} s')
             self._observer.restart(sample)
             return
         self.ages.note(now - sample.time, gap)
@@ -220,8 +227,10 @@ class Tracker:
     def _act(self, now: float) -> FloatArray | None:
         """Return the efforts of the present phase."""
         silent = now - self._heard
-        if silent > self._settings.timeout:
+        if silent > self._settings.timeout and self.phase is Phase.TRACKING:
             self._give_up(now, f'the last joint sample is {silent:.3g} s old')
+        elif silent > self._settings.timeout and not self._waits(now):
+            self.release(now, self._unseen(now))
         time = now + self._settings.delay
         self._begin(time, now)
         if self.phase is Phase.IDLE or now - self._sent < EARLY * self._settings.period:
@@ -232,6 +241,11 @@ class Tracker:
         if self.phase is Phase.RELEASING:
             self._fade(time, now)
         return self._efforts
+
+    def _waits(self, now: float) -> bool:
+        """Tell whether the arm is left alone until a motion that is yet to begin."""
+        is_ahead = self._next is not None and now + self._settings.delay < self._next.start
+        return is_ahead and self.phase is not Phase.TRACKING
 
     def _begin(self, time: float, now: float) -> None:
         """Go over to the next motion where its time has come."""

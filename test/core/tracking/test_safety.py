@@ -279,9 +279,35 @@ def test_without_hold_the_arm_is_let_go(samples):
     np.testing.assert_allclose(loop.arm.position, [np.pi, 0.0], atol=5e-3)
 
 
+def test_a_motion_that_is_yet_to_begin_waits_for_joint_samples(samples):
+    """None before the command, and none for half a second after the first of them."""
+    loop = ClosedLoop(Tracker(ARM, SETTINGS), ARM, late=1)
+    loop.tracker.follow(motion_of(samples, start=1.0), 0.0)
+    loop.run(0.9, lambda sample: sample if 0.2 < sample.time < 0.3 or sample.time > 0.8 else None)
+    assert not loop.commanded
+    assert loop.tracker.take_fault() == ''
+    loop.run(1.2)
+    assert loop.tracker.phase is Phase.TRACKING
+    np.testing.assert_allclose(loop.arm.position, [np.pi, 0.0], atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ('heard', 'reason'),
+    [(0.0, 'no joint sample yet'), (0.3, 'no joint sample for 0.1')],
+)
+def test_a_motion_is_not_begun_without_joint_samples(samples, heard, reason):
+    loop = ClosedLoop(Tracker(ARM, SETTINGS), ARM, late=1)
+    loop.tracker.follow(motion_of(samples, start=0.4), 0.0)
+    loop.run(0.39, lambda sample: sample if sample.time < heard else None)
+    assert loop.tracker.take_fault() == ''
+    loop.run(0.6, lambda sample: None)
+    assert_given_up(loop, reason)
+    assert not loop.commanded
+
+
 def test_refuses_what_it_cannot_follow(samples):
     tracker = Tracker(ARM, SETTINGS)
-    with pytest.raises(InvalidCommand, match='no joint sample'):
+    with pytest.raises(InvalidCommand, match='no joint sample yet.* is not begun'):
         tracker.follow(motion_of(samples), 0.0)
     tracker.hear(JointSample(time=5.0, positions=np.zeros(2)), 5.0)
     with pytest.raises(InvalidCommand, match='ended 4.000 s ago'):
