@@ -46,7 +46,9 @@ SOFTER = {'mismatch.stiffness_scale': 0.9, 'mismatch.damping_scale': 0.9}
 MONITOR = {'use_sim_time': True, 'window': 1.0, 'timeout': 10.0, 'fit_model': True}
 
 
-def test_a_tracked_motion_is_adopted_from_its_efforts_and_judged_again(graph, tmp_path, capsys):
+def test_the_model_of_a_tracked_motion_is_adopted_and_the_next_one_needs_next_to_no_feedback(
+    graph, tmp_path, capsys
+):
     arm = Tracked(graph, **SOFTER)
     assert graph.set_parameters('flat_planner', auto_tune=True)[0].successful
     graph.create(MonitorNode, MONITOR)
@@ -65,11 +67,18 @@ def test_a_tracked_motion_is_adopted_from_its_efforts_and_judged_again(graph, tm
     # What the efforts tell is the arm, 10 % softer, and is taken over.
     assert float(report['model.stiffness']) == pytest.approx(2.7e-3, rel=0.04)
     graph.expect(lambda: any(values(m)['state'] == 'ADOPTED' for m in adopted), 'an adoption')
+    first = arm.errors(arm.end, 1.5).max()
+    arm.move(0.0)
+    arm.wait_until(arm.end + 0.5)
+    second = arm.errors(arm.end, 0.0).max()
+    print('LEFT', first, second)
+    assert second < 5e-3 < first
     graph.publish(PUSH, Float64MultiArray(data=[1e-3, 0.0]), readers=2)
     graph.expect(lambda: {EFFORTS, PUSH} <= set(Recording(path).topics), 'efforts and pushes')
     assert recorder.stop() == 0
     assert analyse.main(['analyse', str(path), '--json', '-']) == 0
-    (again,) = json.loads(capsys.readouterr().out)['reports']
+    again, after = json.loads((X:=capsys.readouterr()).out)["reports"]
+    print('SENT', again['sent'], after['sent'])
     assert again['values']['tracked'] is True
     assert 'stiffness_estimate' not in again['values']
     sent = again['sent']
