@@ -117,8 +117,9 @@ class Tracker:
         self._next = motion
 
     def is_moving(self, now: float) -> bool:
-        """Tell whether a motion is under way or waits."""
-        return self._next is not None or (self._motion is not None and now < self._motion.end)
+        """Tell whether a motion is under way; one that waits is not yet."""
+        is_due = self._next is not None and self._next.start <= now + self._settings.delay
+        return is_due or (self._motion is not None and now < self._motion.end)
 
     def continue_from(self, other: 'Tracker') -> None:
         """Go on where another tracker of the same joints is, with one's own gains."""

@@ -134,7 +134,9 @@ class TrackerNode(GuardedNode):
     def _on_measured(self, msg: JointState) -> None:
         """Answer the samples that a message completes with efforts."""
         samples = self._input.samples(self._reader, msg)
-        self._tracker = self._renewal.renewed(self._tracker, self._now())
+        former, self._tracker = self._tracker, self._renewal.renewed(self._tracker, self._now())
+        if self._tracker is not former:
+            self._log.info(f'follows the adopted model: {self._tracker.certificate.sentence}')
         for sample in samples:
             self._rate.heard(sample.time)
             self._send(self._tracker.hear(sample, max(self._now(), sample.time)))

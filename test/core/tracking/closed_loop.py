@@ -42,6 +42,9 @@ import numpy as np
 ENCODER = 2 * pi / 2**14
 """Step of an encoder of 14 bits [rad]."""
 
+STEPS = 10
+"""Integration steps between two samples, at any of which an effort may begin to act [-]."""
+
 PLANT_STEP = 1e-3
 """Longest integration step [s]."""
 
@@ -72,7 +75,11 @@ def motion_of(samples, start=0.0):
 
 @dataclass
 class ClosedLoop:
-    """A tracker and the arm that it moves, sample by sample."""
+    """
+    A tracker and the arm that it moves, sample by sample.
+
+    Where it is `uneven`, efforts begin to act anywhere between two samples, not at the first.
+    """
 
     tracker: Tracker
     true: PlanarArm
@@ -83,13 +90,15 @@ class ClosedLoop:
     saturation: list | None = None
     position: np.ndarray | None = None
     push: Callable[[float], float] = lambda _: 0.0
+    uneven: bool = False
     times: list = field(default_factory=list)
     positions: list = field(default_factory=list)
     efforts: list = field(default_factory=list)
 
     def __post_init__(self):
         """Stand still at time zero."""
-        step = self.period / ceil(self.period / PLANT_STEP - 1e-9)
+        longest = self.period / STEPS if self.uneven else PLANT_STEP
+        step = self.period / ceil(self.period / longest - 1e-9)
         self.arm = SimulatedArm(
             self.true,
             step=step,
@@ -114,12 +123,15 @@ class ClosedLoop:
             now, seen = self.arm.time, spoil(self.sample())
             given = self.tracker.watch(now) if seen is None else self.tracker.hear(seen, now)
             self.waiting.append(given)
-            efforts = self.waiting.pop(0)
+            efforts, former = self.waiting.pop(0), self.acting
             self.acting = self.acting if efforts is None else efforts
             self.commanded = self.commanded or efforts is not None
             self.times.append(now)
             self.positions.append(self.arm.position)
-            self.efforts.append(self.acting)
+            self.efforts.append(former if self.uneven else self.acting)
+            if self.uneven and self.commanded:
+                self.arm.hold(former)
+                self.arm.advance(now + self.period * self.random.integers(STEPS) / STEPS)
             pushed = self.push(now)
             if self.commanded or pushed:  # else brakes hold what weight would move
                 self.arm.hold(self.acting + np.append(np.zeros(self.true.n - 2), pushed))

@@ -18,8 +18,9 @@ from dataclasses import replace
 from math import pi
 
 from core.conftest import ARM, envelope
-from core.tracking.closed_loop import ClosedLoop, motion_of, samples_of, settling
+from core.tracking.closed_loop import ClosedLoop, ENCODER, motion_of, samples_of, settling
 from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.monitor.model_estimate import estimate_model
 from flat_planner_ros.core.plant import EffortProfile, rollout
 from flat_planner_ros.core.tracking import Phase, Tracker, TrackerSettings
 import numpy as np
@@ -186,6 +187,27 @@ def test_an_arm_with_weight(factors):
     assert (np.abs(efforts).max(axis=0) <= 1.5 * np.abs(samples.efforts).max(axis=0)[:3]).all()
 
 
+def test_with_the_model_of_the_first_motion_the_next_one_needs_next_to_no_feedback(plan_of_paper):
+    """Efforts begin to act anywhere between two samples, which joint states do not show."""
+    true = PLANT['k, c -10 %']
+    first = ClosedLoop(Tracker(ARM, SETTINGS), true, uneven=True)
+    first.tracker.follow(motion_of(plan_of_paper, START), 0.0)
+    times, positions, efforts = first.run(START + 2.0)
+    shown = ENCODER * np.round(positions / ENCODER)
+    padded = np.column_stack((efforts, 0.0 * efforts))
+    found = estimate_model(times, shown, padded, ARM, are_held=True)
+    assert found.is_trustworthy, found.reason
+    model = found.values.applied_to(ARM)
+    planned = samples_of(model)
+    second = ClosedLoop(Tracker(model, SETTINGS), true, uneven=True)
+    second.tracker.follow(motion_of(planned, START), 0.0)
+    times, positions, efforts = second.run(START + 1.5)
+    assert np.abs(positions[times > START + 1.0] - [pi, 0.0]).max() < 1e-3
+    fed_forward = np.interp(times, START + planned.times, planned.efforts[:, 0])
+    feedback = np.abs(efforts[:, 0] - fed_forward)[times < START + 1.0].max()
+    assert feedback < 0.1 * np.abs(planned.efforts).max()
+
+
 def test_known_friction_is_compensated(plan_of_paper):
     """On an arm without errors nothing is left for the feedback."""
     rough = PLANT['friction']
@@ -201,6 +223,7 @@ def test_a_tracker_for_the_right_model_goes_on_where_the_other_one_holds():
     loop.run(0.1)
     first.follow(motion_of(samples_of(), loop.arm.time), loop.arm.time)
     assert first.is_moving(loop.arm.time)
+    assert not first.is_moving(loop.arm.time - 0.05), 'as long as it waits'
     _, _, before = loop.run(2.0)
     assert not first.is_moving(loop.arm.time)
     second.continue_from(first)

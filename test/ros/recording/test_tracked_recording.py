@@ -15,15 +15,15 @@
 """A tracked motion is reported, recorded and adopted as what it is."""
 
 import json
+from math import pi
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from flat_planner_ros.ros.nodes.monitor_node import MonitorNode
 from flat_planner_ros.ros.wire import interfaces, stamps
 from flat_planner_ros.ros.wire.message_types import definition
 import pytest
 from rclpy.serialization import serialize_message
 from ros.rig import values
-from ros.tracked_arm import EFFORTS, Tracked
+from ros.tracked_arm import arguments, EFFORTS, Tracked
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -43,7 +43,7 @@ TOPICS = {
     PUSH: 'std_msgs/msg/Float64MultiArray',
 }
 SOFTER = {'mismatch.stiffness_scale': 0.9, 'mismatch.damping_scale': 0.9}
-MONITOR = {'use_sim_time': True, 'window': 1.0, 'timeout': 10.0, 'fit_model': True}
+MONITOR = {'use_sim_time': 'true', 'window': 1.0, 'timeout': 10.0, 'fit_model': 'true'}
 
 
 def test_the_model_of_a_tracked_motion_is_adopted_and_the_next_one_needs_next_to_no_feedback(
@@ -51,15 +51,16 @@ def test_the_model_of_a_tracked_motion_is_adopted_and_the_next_one_needs_next_to
 ):
     arm = Tracked(graph, **SOFTER)
     assert graph.set_parameters('flat_planner', auto_tune=True)[0].successful
-    graph.create(MonitorNode, MONITOR)
+    # In processes of their own, which are in time: of joint states none may be missed, and what
+    # is sent has no stamps.
+    graph.start('monitor_node', *arguments(MONITOR))
     arm.hear_monitor()
     adopted = graph.collect(DiagnosticArray, '/flat_planner/status', interfaces.VERDICTS)
     path = tmp_path / 'tracked.mcap'
-    # In a process of its own, which is in time: what is sent has no stamps.
     recorder = graph.start('record', '--output', str(path))
     graph.expect(lambda: path.exists() and path.stat().st_size, 'the recorder')
     graph.expect(lambda: '/diagnostics' in Recording(path).topics, 'the recorder on diagnostics')
-    arm.move(1.5)
+    arm.move(pi)
     graph.expect(lambda: arm.reports, 'a report')
     report = values(arm.reports[-1])
     assert report['tracked'] == 'true'
@@ -67,18 +68,17 @@ def test_the_model_of_a_tracked_motion_is_adopted_and_the_next_one_needs_next_to
     # What the efforts tell is the arm, 10 % softer, and is taken over.
     assert float(report['model.stiffness']) == pytest.approx(2.7e-3, rel=0.04)
     graph.expect(lambda: any(values(m)['state'] == 'ADOPTED' for m in adopted), 'an adoption')
-    first = arm.errors(arm.end, 1.5).max()
+    graph.expect(lambda: graph.logged('follows the adopted model'), 'a tracker for it')
+    first = arm.errors(arm.end, pi).max()
     arm.move(0.0)
     arm.wait_until(arm.end + 0.5)
     second = arm.errors(arm.end, 0.0).max()
-    print('LEFT', first, second)
     assert second < 5e-3 < first
     graph.publish(PUSH, Float64MultiArray(data=[1e-3, 0.0]), readers=2)
     graph.expect(lambda: {EFFORTS, PUSH} <= set(Recording(path).topics), 'efforts and pushes')
     assert recorder.stop() == 0
     assert analyse.main(['analyse', str(path), '--json', '-']) == 0
-    again, after = json.loads((X:=capsys.readouterr()).out)["reports"]
-    print('SENT', again['sent'], after['sent'])
+    again, after = json.loads(capsys.readouterr().out)['reports']
     assert again['values']['tracked'] is True
     assert 'stiffness_estimate' not in again['values']
     sent = again['sent']
