@@ -125,14 +125,15 @@ class TermSum:
         signs = _odd_signs(orders)
         mirrored = table[:, ::-1]
         with np.errstate(under='ignore'):
-            fine, coarse = self._grid_tables(size, places)
+            tables = self._grid_tables(size, places) if count else None
             for start in range(0, half, CHUNK):
                 stop = min(start + CHUNK, half)
-                blocks = coarse[start // size : -(-stop // size)]
                 powers = np.empty((factors.shape[1] - 4 * count, stop - start))
                 _fill_powers(powers, x[start:stop])
                 part = factors[:, 4 * count :] @ powers
-                if count:
+                if tables is not None:
+                    fine, coarse = tables
+                    blocks = coarse[start // size : -(-stop // size)]
                     scaled = (amplitudes * blocks).view(float)
                     product = scaled.reshape(orders * len(blocks), 4 * count) @ fine
                     part += product.reshape(orders, -1)[:, : stop - start]

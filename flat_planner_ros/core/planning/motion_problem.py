@@ -22,6 +22,7 @@ an arm, a cost and a duration, and kept with its samples.
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import sqrt
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import (
     ComplexArray,
@@ -94,29 +95,34 @@ class MotionProblem:
     equation: FloatArray
     rates: FloatArray
 
-    @cached_property
+    @property
     def unit(self) -> UnitMotion:
         """Law over 1 rad in normalised time."""
-        with strict_arithmetic():
-            return unit_motion(self.equation)
+        return self._over_one.unit
 
-    @cached_property
+    @property
     def cost_value(self) -> float:
         """Cost of 1 rad."""
-        # (35) with every derivative in units of the half duration.
-        scale: float = (0.5 * float(self.duration)) ** (1.0 - 2.0 * CONDITIONS)
-        return self.unit.costate * scale
+        return self._over_one.cost_value
 
-    @cached_property
+    @property
     def reach(self) -> float:
         """Distance from which numbers overflow [rad]."""
+        return self._over_one.reach
+
+    @cached_property
+    def _over_one(self) -> '_OverOne':
+        """Solve the motion over 1 rad."""
         with strict_arithmetic():
-            largest = float((self.rates * self.unit.peaks).max())
+            unit = unit_motion(self.equation)
+            largest = float((self.rates * unit.peaks).max())
+        # (35) with every derivative in units of the half duration.
+        scale: float = (0.5 * float(self.duration)) ** (1.0 - 2.0 * CONDITIONS)
+        cost = unit.costate * scale
         # A law that is no minimum, which its certificate refuses, might have a negative cost.
-        if self.cost_value <= 0.0:
-            return 0.0
         # Roots first: a cost of less than 1e-8 would take the quotient out of range.
-        return min(MAX_NUMBER / largest, sqrt(MAX_NUMBER) / sqrt(self.cost_value))
+        reach = min(MAX_NUMBER / largest, sqrt(MAX_NUMBER) / sqrt(cost)) if cost > 0.0 else 0.0
+        return _OverOne(unit, cost, reach)
 
     @cached_property
     def roots(self) -> ComplexArray:
@@ -141,6 +147,14 @@ class MotionProblem:
             np.multiply(_kept_grid(self, intervals), distance, out=table)
         else:
             _fill(self, table, distance)
+
+
+class _OverOne(NamedTuple):
+    """The motion over 1 rad, its cost, and the distance from which numbers overflow [rad]."""
+
+    unit: UnitMotion
+    cost_value: float
+    reach: float
 
 
 def joint_rows(mapping: FlatMap) -> FloatArray:
