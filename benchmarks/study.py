@@ -43,6 +43,7 @@ from flat_planner_ros.core.study import (
     Refused,
     Study,
 )
+from flat_planner_ros.core.tracking import TrackerSettings
 from measurement import Section, verdict
 import numpy as np
 import problem
@@ -55,6 +56,9 @@ PLANS, MOTIONS, SCALING, MEMORY = 20_000.0, 5_000.0, 1.8, 100.0
 
 LONGER = 100.0
 """Target of simulated motions of longer arms [1/s]."""
+
+FOR_TRACKERS = 100.0
+"""Target of motions of two-joint arms that trackers carry out [1/s]."""
 
 MILLION = 1_000_000
 
@@ -70,7 +74,14 @@ study:
     plant.mismatch.stiffness_scale: {{uniform: [0.75, 1.25]}}
 """
 
-PROGRAM = 'import sys; from flat_planner_ros.programs import study; sys.exit(study())'
+PROGRAM = """
+import re, sys
+from flat_planner_ros.programs import study
+assert study() == 0
+status = open('/proc/self/status', encoding='ascii').read()
+print(re.search(r'VmHWM:\\s+(\\d+) kB', status)[1], file=sys.stderr)
+"""
+"""Does a study, and says what memory it took at most [kB]."""
 
 
 def sections(options: Namespace) -> Iterator[Section]:
@@ -85,6 +96,7 @@ class Cases:
 
     joints: int
     plays: bool
+    tracker: TrackerSettings | None = None
 
     def __call__(self, columns: Mapping[str, Column]) -> Sequence[Batch | Refused]:
         """Return one batch."""
@@ -94,7 +106,12 @@ class Cases:
         names = tuple(f'joint{index + 1}' for index in range(self.joints))
         settings = SessionSettings(joints=names, arm=arm, options=PlanningOptions())
         template = Case(
-            settings=settings, true=arm, start=(0.0,) * self.joints, final=final, plays=self.plays
+            settings=settings,
+            true=arm,
+            start=(0.0,) * self.joints,
+            final=final,
+            plays=self.plays,
+            tracker=self.tracker,
         )
         true = np.tile(last_links_of(arm), (count, 1))
         true[:, 2] *= columns['stiffness']
@@ -118,7 +135,9 @@ def _longer() -> PlanarArm:
     )
 
 
-def _study(rows: int, joints: int, *, plays: bool) -> Study:
+def _study(
+    rows: int, joints: int, *, plays: bool, tracker: TrackerSettings | None = None
+) -> Study:
     """Return a study of random durations and true springs."""
     limits = {'duration': (0.8, 1.3), 'stiffness': (0.75, 1.25)}
     draws = tuple(
@@ -127,7 +146,7 @@ def _study(rows: int, joints: int, *, plays: bool) -> Study:
     )
     return Study(
         axes=Axes(draws=draws, repeats=rows, seed=1),
-        cases=Cases(joints=joints, plays=plays),
+        cases=Cases(joints=joints, plays=plays, tracker=tracker),
         joints=tuple(f'joint{index + 1}' for index in range(joints)),
         chunk=min(CHUNK, rows // 4),
     )
@@ -140,6 +159,11 @@ def _rates() -> Section:
         ('plans with predicted residuals', PLANS, _study(40_000, 2, plays=False)),
         ('the same, simulated', MOTIONS, _study(8_000, 2, plays=True)),
         ('three joints, simulated', LONGER, _study(400, 3, plays=True)),
+        (
+            'two joints, with a tracker',
+            FOR_TRACKERS,
+            _study(2000, 2, plays=True, tracker=TrackerSettings()),
+        ),
     ):
         one, two = _rate(study, 1), _rate(study, 2)
         rows.append((name, f'{one:.0f} /s', f'{two:.0f} /s', f'{two / one:.2f}'))
@@ -192,12 +216,15 @@ def _memory(options: Namespace) -> Section:
             spec.write_text(SPEC.format(rows=count), encoding='utf-8')
             words = [str(spec), '-o', str(Path(folder, f'{count}.csv'))]
             begun = perf_counter()
-            process = subprocess.Popen(
-                [sys.executable, '-c', PROGRAM, *words], stdout=subprocess.DEVNULL
+            # By its own word: what the system tells of a child includes what its parent took.
+            process = subprocess.run(
+                [sys.executable, '-c', PROGRAM, *words],
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                check=True,
             )
-            _, status, usage = os.wait4(process.pid, 0)
-            assert status == 0
-            megabytes = usage.ru_maxrss / 1000.0
+            megabytes = int(process.stderr.split()[-1]) / 1000.0
             rows.append((f'{count:,}', f'{megabytes:.0f} MB', f'{perf_counter() - begun:.1f} s'))
     is_met = megabytes < MEMORY
     return Section(

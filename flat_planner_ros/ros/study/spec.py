@@ -20,6 +20,7 @@ parameters, `plant.` and `tracker.` before the other nodes', and a few that are 
 goal, the start, via points, the duration, a payload, whether a tracker is in the loop).
 """
 
+from argparse import ArgumentTypeError
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -34,6 +35,7 @@ from flat_planner_ros.ros.parameters import planner, plant, tracker
 from flat_planner_ros.ros.parameters.parameter_file import file_content, file_values, STUDY
 from flat_planner_ros.ros.parameters.row import DOUBLE, DOUBLES, Row
 from flat_planner_ros.ros.programs.angles import angle_of
+from flat_planner_ros.ros.programs.command_line import via_point
 from flat_planner_ros.ros.wire import interfaces
 from flat_planner_ros.version import version_line
 import numpy as np
@@ -158,6 +160,8 @@ def read_spec(path: Path, overrides: Mapping[str, Any] | None = None) -> Spec:
     axes = _axes(_mapping(block, 'axes'), block)
     for name in axes.names:
         fixed.pop(name, None)
+    if not any(name.startswith('goal.') for name in (*fixed, *axes.names)):
+        raise InvalidStudy(f'{path} names no goal: set goal.JOINT, or let it vary')
     has_own = any(key != STUDY for key in content)
     return Spec(
         path=path,
@@ -307,8 +311,17 @@ def _value(name: str, value: Any) -> Any:
         return value
     if name == VIA:
         texts = value if isinstance(value, list) else [value]
-        return tuple(str(text) for text in texts if text)
+        return tuple(_via(str(text)) for text in texts if text)
     return _for_row(ROWS[name], value)
+
+
+def _via(text: str) -> str:
+    """Return a via point as it is written, if it is one."""
+    try:
+        via_point(text)
+    except ArgumentTypeError as error:
+        raise InvalidStudy(f'{VIA}: {error}') from None
+    return text
 
 
 def _is_angle(name: str) -> bool:

@@ -223,6 +223,9 @@ def test_a_fingerprint_is_that_of_one_table(tmp_path):
         ('study: {{set: {{duration: long}}}}', "duration must be a number, got 'long'"),
         ('study: {{repeats: 0}}', 'repeats must be a whole number above 0'),
         ('study: {{params_file: none.yaml}}', 'cannot read'),
+        ('study: {{axes: {{duration: [1.0]}}}}', 'names no goal: set goal.JOINT'),
+        ('study: {{set: {{goal.joint1: 1, via: joint1=x}}}}', "via: 'joint1=x' is not JOINT=RAD"),
+        ('study: {{set: {{goal.joint1: 1.0}}, axes: {{via: [joint1=1@x]}}}}', 'via: .*joint1=1@x'),
         ('study: {{axes: {{"strategy[1]": [a]}}}}', r'nothing is called strategy\[1\]'),
     ],
 )
