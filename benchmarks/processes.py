@@ -86,7 +86,9 @@ class NodeProcess:
         self, name: str, executor: str, parameters: dict[str, str], file: Path | None = None
     ) -> None:
         """Start it."""
-        program = ['-m', f'flat_planner_ros.ros.nodes.{name}_node']
+        # What `ros2 run` starts.
+        entry = f'from flat_planner_ros.programs import {name}_node as run'
+        program = ['-c', f'{entry}; raise SystemExit(run())']
         if name == BARE:
             program = [str(Path(__file__).parent / 'bare_node.py')]
         elif executor != SHIPPED:

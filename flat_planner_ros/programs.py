@@ -19,6 +19,7 @@ Loading them takes most of a second. A SIGINT or SIGTERM ends a node in that tim
 once, with exit code 0 and without a word. It ends a tool, whose work is not done then, with 130.
 """
 
+import gc
 from importlib import import_module
 import os
 import signal
@@ -129,8 +130,13 @@ def _run(module: str, interrupted: int = 0) -> int:
     for variable in THREADS:
         os.environ.setdefault(variable, '1')
     try:
+        # All that is loaded stays, and the garbage collector would look at it a dozen times.
+        gc.disable()
+        program = import_module(f'flat_planner_ros.ros.{module}')
+        gc.freeze()
+        gc.enable()
         # A module with nodes catches signals by itself from here on, while they exist.
-        return int(import_module(f'flat_planner_ros.ros.{module}').main())
+        return int(program.main())
     finally:
         # A late signal must not spoil the exit code while the interpreter is taken down.
         for number in SIGNALS:

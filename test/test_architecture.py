@@ -259,6 +259,12 @@ def test_wings_are_entered_by_their_public_lists(path):
             assert names <= set(public_list(wing(module))), module
 
 
+def test_the_front_door_loads_what_is_asked_for():
+    code = 'import sys, flat_planner_ros.core.arm; print(*sys.modules)'
+    run = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert set(map(wing, run.stdout.split())) - {''} == {'arm'}
+
+
 def test_the_front_door_is_small():
     assert len(public_list('')) <= 32
 

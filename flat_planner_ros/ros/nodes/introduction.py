@@ -28,6 +28,8 @@ from flat_planner_ros.ros.parameters.parameter_file import block_names, reaches
 from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import interfaces
+from flat_planner_ros.ros.wire.log_lines import write_line
+from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 
 FILE_FLAG = '--params-file'
@@ -66,10 +68,10 @@ def introduce(nodes: Sequence[Node], args: Sequence[str]) -> None:
     for node in nodes:
         sentence = getattr(node, 'introduction', '')
         if sentence:
-            node.get_logger().info(sentence)
-            node.get_logger().info(sources_sentence(node, files))
+            for line in (sentence, sources_sentence(node, files)):
+                write_line(node.get_logger(), LoggingSeverity.INFO, line)
     for warning in unused_blocks([node.get_fully_qualified_name() for node in nodes], files):
-        nodes[0].get_logger().warning(warning)
+        write_line(nodes[0].get_logger(), LoggingSeverity.WARN, warning)
 
 
 def arm_sentence(joints: Sequence[str], drive: Drive) -> str:

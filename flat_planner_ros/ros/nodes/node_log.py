@@ -20,8 +20,8 @@ import re
 import select
 
 from flat_planner_ros.ros.wire import stamps
+from flat_planner_ros.ros.wire.log_lines import write_line
 from rclpy.clock import Clock, ClockType
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 
@@ -36,9 +36,6 @@ LONGEST = 2000
 
 NUMBER = re.compile(r'(?<!\w)[-+]?\d[\d.e+-]*')
 """Numbers do not make another kind of fault, but those in names do."""
-
-PLACE = ('NodeLog', __file__, 0)
-"""Function, file and line of all lines, for those who show them."""
 
 LOST = '{} lines could not be written: nobody reads them'
 """What is said once a console that was full can be written to again."""
@@ -147,15 +144,6 @@ class NodeLog:
             self._lost += 1
             return
         if self._lost:
-            self._log(LoggingSeverity.WARN, LOST.format(self._lost))
+            write_line(self._logger, LoggingSeverity.WARN, LOST.format(self._lost))
             self._lost = 0
-        self._log(severity, text[:LONGEST])
-
-    def _log(self, severity: LoggingSeverity, text: str) -> None:
-        """Write a line."""
-        # Not by the logger's methods: they look up the place of their caller in its sources, which
-        # takes longer than planning a motion.
-        if self._logger.is_enabled_for(severity):
-            rclpy_implementation.rclpy_logging_rcutils_log(
-                severity, self._logger.name, text, *PLACE
-            )
+        write_line(self._logger, severity, text[:LONGEST])

@@ -30,6 +30,7 @@ from flat_planner_ros.ros.nodes.certain_end import certain_end
 from flat_planner_ros.ros.nodes.early_loading import LOADED
 from flat_planner_ros.ros.nodes.guarded_callbacks import GuardedNode
 from flat_planner_ros.ros.nodes.introduction import introduce
+from flat_planner_ros.ros.wire.log_lines import write_line
 from flat_planner_ros.version import ShowVersion
 import rclpy
 from rclpy.exceptions import NotInitializedException, ParameterException
@@ -99,6 +100,7 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
 
     with signals_caught() as interrupted, certain_end(wake, rest):
         try:
+            gc.disable()  # until there is what stays, `_leave_alone`
             _refuse_strays(sys.argv if args is None else args)
             _init(args)
             is_open = True
@@ -111,7 +113,7 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
                 executor.add_node(nodes[-1])
             introduce(nodes, sys.argv if args is None else args)
             for node in nodes:
-                node.get_logger().info('ready')
+                write_line(node.get_logger(), LoggingSeverity.INFO, 'ready')
             is_ready = True
             _leave_alone()
             is_settled = False
@@ -136,6 +138,7 @@ def run(creators: Sequence[Callable[[], GuardedNode]], args: Sequence[str] | Non
                     raise
                 return _explained(error)
         finally:
+            gc.enable()
             for node in nodes:
                 node.destroy_node()
             rclpy.try_shutdown()
@@ -150,6 +153,7 @@ def _leave_alone() -> None:
     sample waits. Only where the process is the nodes' own: what is frozen is never collected.
     """
     gc.freeze()
+    gc.enable()
 
 
 def _explained(error: Exception) -> int:

@@ -29,8 +29,10 @@ from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.ros.parameters.arm_model import model_defaults
 from flat_planner_ros.ros.parameters.plausibility import doubts
 from flat_planner_ros.ros.parameters.row import InvalidParameter, Row, Values, wrong_type
+from flat_planner_ros.ros.wire.log_lines import write_line
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -81,16 +83,17 @@ class NodeParameters(Generic[Settings]):
         self._build = build
         self._apply = apply
         overrides = {name: p.value for name, p in node._parameter_overrides.items()}
-        refuse_unknown(overrides, list(self._rows), node.get_logger().warning)
+        refuse_unknown(overrides, list(self._rows), self._warn)
         defaults = model_defaults(overrides)
         for row in rows:
             _declare(node, row, defaults.get(row.name, row.default))
         self.settings = self._checked({})
         for doubt in doubts(self.values):
-            node.get_logger().warning(doubt)
+            self._warn(doubt)
         self.is_example = bool(defaults)
         if defaults:
-            node.get_logger().info("no model is given: this is the paper's arm")
+            text = "no model is given: this is the paper's arm"
+            write_line(node.get_logger(), LoggingSeverity.INFO, text)
         node.add_on_set_parameters_callback(self._validate)
         node.add_post_set_parameters_callback(self._changed)
 
@@ -98,6 +101,10 @@ class NodeParameters(Generic[Settings]):
     def values(self) -> Values:
         """Return the present values of all parameters that have one."""
         return self._values({})
+
+    def _warn(self, text: str) -> None:
+        """Say what is doubtful."""
+        write_line(self._node.get_logger(), LoggingSeverity.WARN, text)
 
     def _checked(self, changes: Values) -> Settings:
         """Return the settings of the present values with some changes."""
