@@ -55,6 +55,9 @@ AFTER = 2.0
 STEP = 1e-3
 """Longest integration step [s]."""
 
+JITTERS = (0.005, 0.01, 0.015, 0.02, 0.03)
+"""Times by which an effort may be later than the loop knows, each as likely as none [s]."""
+
 LIMITS = (np.inf, 0.3, 0.1, 0.05, 0.02, 0.014, 0.01, 0.007)
 """Largest efforts [N m]; the plan takes 0.014."""
 
@@ -99,6 +102,12 @@ def sections(_: Namespace) -> Iterator[Section]:
         ['rate', 'certified to', 'settled to', 'unstable from'],
         [_unknown(samples, rate) for rate in RATES],
         [about, 'nominal arm; beyond the sample of delay that it does know; [ms]'],
+    )
+    yield Section(
+        'Efforts late by anything up to a time, unknown to the loop: settled [s]; RMS [mrad]',
+        ['rate', *(f'{1e3 * jitter:g} ms' for jitter in JITTERS)],
+        [_jittered(samples, rate) for rate in RATES],
+        [about, 'stiffness and damping 10 % low, beyond the sample of delay that is known'],
     )
     yield Section(
         'A second motion by the model fitted to the first: settled [s]; swing at the end [rad]',
@@ -175,6 +184,17 @@ def _unknown(samples: PlanSamples, rate: float) -> list[str]:
     ]
 
 
+def _jittered(samples: PlanSamples, rate: float) -> list[str]:
+    """Return the row of a rate."""
+    cells, true = [], _faults()['k, c -10 %']
+    for jitter in JITTERS:
+        tracker = Tracker(arm(), _settings(rate, 1))
+        run = _Run(samples, true, tracker, rate, 1, jitter=round(jitter * rate))
+        held = tracker.phase is Phase.TRACKING
+        cells.append(f'{run.settling}; {1e3 * run.left:.2g}' if held else 'given up')
+    return [f'{rate:g} Hz', *cells]
+
+
 def _adopted(samples: PlanSamples, true: PlanarArm, name: str) -> list[str]:
     """Return the row of an arm whose model is fitted to its first motion."""
     settings = _settings(500.0, 1)
@@ -231,6 +251,7 @@ class _Run:
         late: int,
         noise: float = 0.0,
         pushed: float = np.inf,
+        jitter: int = 0,
     ) -> None:
         begin, period = 0.05, 1.0 / rate
         plant = SimulatedArm(true, step=min(STEP, period))
@@ -242,7 +263,7 @@ class _Run:
             velocities=samples.velocities,
             accelerations=samples.accelerations,
         )
-        waiting: list[np.ndarray | None] = [None] * late
+        waiting: list[tuple[int, np.ndarray]] = []
         acting, self.peak = np.zeros(1), 0.0
         times, errors, shown, applied = [], [], [], []
         for k in range(round((begin + 1.0 + AFTER) * rate)):
@@ -253,11 +274,15 @@ class _Run:
             else:
                 angles = plant.position + noise * random.standard_normal(2)
                 seen = ENCODER * np.round(angles / ENCODER)
-                waiting.append(tracker.hear(JointSample(time=now, positions=seen), now))
+                given = tracker.hear(JointSample(time=now, positions=seen), now)
+                if given is not None:
+                    due = k + late + (int(random.integers(jitter + 1)) if jitter else 0)
+                    # What is sent later does not arrive before.
+                    waiting.append((max(due, waiting[-1][0] if waiting else 0), given))
                 if k == 2:
                     tracker.follow(motion, now)
-                given = waiting.pop(0)
-                acting = acting if given is None else given
+                while waiting and waiting[0][0] <= k:
+                    acting = waiting.pop(0)[1]
             self.peak = max(self.peak, float(np.abs(acting).max()))
             times.append(now - begin - 1.0)
             errors.append(plant.position - motion.at(now).positions)
