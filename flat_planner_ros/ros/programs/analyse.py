@@ -20,6 +20,7 @@ from contextlib import redirect_stdout
 from dataclasses import replace
 from functools import partial
 import json
+from math import inf
 from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
@@ -405,8 +406,12 @@ def _compared(mine: Mapping[str, Any], its: Mapping[str, Any]) -> str:
     worst = max((_difference(mine.get(k), its.get(k)), k) for k in {*mine, *its} - {'message'})
     if worst[0] <= AGREEMENT:
         return 'the recorded report says the same'
+    difference, key = worst
+    by = f'by {difference:.1e} in {key}'
+    if difference == inf:
+        by = f'in {key}, {its.get(key, "nothing")} and not {mine.get(key, "nothing")}'
     return (
-        f'the recorded report differs by {worst[0]:.1e} in {worst[1]}; it rests on '
+        f'the recorded report differs {by}; it rests on '
         f'{its.get("samples")} samples, this one on {mine.get("samples")}'
     )
 
@@ -417,7 +422,7 @@ def _difference(first: Any, second: Any) -> float:
         return 0.0
     if isinstance(first, (int, float)) and isinstance(second, (int, float)):
         return abs(first - second) / max(abs(first), abs(second))
-    return float('inf')
+    return inf
 
 
 def _value(text: str) -> bool | int | float | str:
