@@ -68,16 +68,21 @@ class Process:
         The program and its arguments.
     environment
         Variables besides the test's own.
+    stdin
+        What it reads, a file's number; None for what the test reads.
 
     """
 
-    def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
+    def __init__(
+        self, command: Sequence[str], environment: Mapping[str, str], stdin: int | None = None
+    ) -> None:
         """Start it."""
         self._out = tempfile.TemporaryFile()  # noqa: SIM115  Closed by `close`.
         self._err = tempfile.TemporaryFile()  # noqa: SIM115
         self._popen = subprocess.Popen(
             command,
             env={**os.environ, **environment},
+            stdin=stdin,
             stdout=self._out,
             stderr=self._err,
             start_new_session=True,
@@ -216,18 +221,20 @@ class Graph:
         self._nodes.remove(node)
         node.destroy_node()
 
-    def start(self, module: str, *arguments: str, **environment: str) -> Process:
+    def start(
+        self, module: str, *arguments: str, stdin: int | None = None, **environment: str
+    ) -> Process:
         """Start a module of our ROS layer, e.g. 'plant_node', as a process on the same graph."""
         wing = 'nodes' if module.endswith('_node') else 'programs'
         name = f'flat_planner_ros.ros.{wing}.{module}'
-        return self.run([sys.executable, '-m', name, *arguments], **environment)
+        return self.run([sys.executable, '-m', name, *arguments], stdin, **environment)
 
-    def run(self, command: Sequence[str], **environment: str) -> Process:
+    def run(self, command: Sequence[str], stdin: int | None = None, **environment: str) -> Process:
         """Start any program on the same graph; it finds the code under test first."""
         paths = [str(Path(flat_planner_ros.__file__).parents[1])]
         paths += filter(None, [os.environ.get('PYTHONPATH')])
         own = {'PYTHONPATH': os.pathsep.join(paths), 'ROS_DOMAIN_ID': str(self.domain)}
-        process = Process(command, {**own, **environment})
+        process = Process(command, {**own, **environment}, stdin)
         self._processes.append(process)
         return process
 

@@ -42,7 +42,7 @@ PATIENCE = 200.0
 class Bench:
     """The nodes of an arm that is not what its file says, and the program."""
 
-    def __init__(self, graph, tmp_path, *options, speed=3.0):
+    def __init__(self, graph, tmp_path, *options, speed=3.0, stdin=None):
         """Start them."""
         self.graph = graph
         self.rough, self.fitted = tmp_path / 'rough.yaml', tmp_path / 'arm.yaml'
@@ -52,7 +52,7 @@ class Bench:
         given = '--params-file', str(self.rough)
         self.suite = Suite(graph, None, plant, *given, speed=speed)
         files = '--params-file', str(self.rough), '-o', str(self.fitted)
-        self.process = graph.start('excite', *files, *options)
+        self.process = graph.start('excite', *files, *options, stdin=stdin)
 
     def wait(self):
         """Return the exit code, the nodes spinning meanwhile."""
@@ -85,14 +85,29 @@ def test_a_rough_file_becomes_a_good_one(graph, tmp_path):
     assert peaks[0] <= peaks[1]
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_an_abort_brings_the_arm_to_rest(graph, tmp_path, number):
-    bench = Bench(graph, tmp_path, speed=1.0)
+@pytest.fixture
+def terminal():
+    """Return both ends of a terminal: that of whoever types, and that of the program."""
+    ends = os.openpty()
+    yield ends
+    for end in ends:
+        os.close(end)
+
+
+@pytest.mark.parametrize(
+    'end', [signal.SIGINT, signal.SIGTERM, b'\n'], ids=['SIGINT', 'SIGTERM', 'Return']
+)
+def test_an_abort_brings_the_arm_to_rest(graph, tmp_path, terminal, end):
+    keyboard, stdin = terminal
+    bench = Bench(graph, tmp_path, speed=1.0, stdin=stdin)
     suite = bench.suite
     graph.expect(lambda: suite.verdicts('ACCEPTED'), 'a motion', PATIENCE)
     begin = float(suite.verdicts('ACCEPTED')[0]['start_time'])
     suite.wait_until(begin + 0.1)
-    os.kill(bench.process.pid, number)
+    if isinstance(end, bytes):
+        os.write(keyboard, end)
+    else:
+        os.kill(bench.process.pid, end)
     assert bench.wait() == excite.INTERRUPTED
     assert 'aborted: ' in bench.process.stderr
     graph.expect(lambda: suite.verdicts('STOPPED', 'FINISHED', 'FAILED'), 'the end of the motion')
