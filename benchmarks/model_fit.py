@@ -70,7 +70,7 @@ def sections(options: Namespace) -> Iterator[Section]:
         rows = [_row(sensors, bound, cases, pool) for sensors, bound in SENSORS.items()]
         header = (
             *('rate, noise, encoder', 'median error', '90 %', 'goal', 'within the goal'),
-            *('within 2 std', 'misfit said', 'CPU for a minute'),
+            *('within 2 std', 'misfit said', f'CPU for {UNTIL:g} s'),
         )
         title = f'Model fit: worst of six parameters, {cases} random arms 10 to 30 % off'
         yield Section(title, header, rows)
@@ -98,7 +98,7 @@ def _row(
         f'{100 * np.mean(errors <= bound):.0f} %',
         f'{100 * np.mean(inside):.0f} %',
         f'{sum(each.is_misfit for each in found)} of {cases}',
-        f'{np.mean([each.spent for each in found]) * 60.0 / UNTIL:.0f} s',
+        f'{np.mean([each.spent for each in found]):.1f} s',
     )
 
 
