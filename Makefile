@@ -11,7 +11,7 @@ DISTRO ?= jazzy
 LOCK ?= requirements$(if $(filter-out jazzy,$(DISTRO)),-$(DISTRO)).lock
 TEST_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-test.lock))
 DOCS_LOCK = $(if $(LOCK),$(if $(ROS),,requirements-docs.lock))
-COMPILE = $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header --no-annotate \
+COMPILE = $(BIN)/uv pip compile --quiet --no-config --universal --upgrade --no-header --no-annotate --no-strip-extras \
   --python-version 3.10 --generate-hashes --default-index https://pypi.org/simple
 PIP = $(BIN)/python -m pip install --quiet --progress-bar off
 SETUPTOOLS := 'setuptools>=70.1,<80'

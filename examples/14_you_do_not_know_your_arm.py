@@ -87,8 +87,7 @@ found = excitation.estimate
 for name in ('stiffness', 'damping'):
     print(f'{name}: {getattr(found, name):.3g}, in truth {getattr(real, name):.3g}')
 
-above.set_xlabel('time, without the waiting [s]')
-above.set_ylabel('angle [rad]')
+above.set(xlabel='time, without the waiting [s]', ylabel='angle [rad]')
 above.legend(above.lines[:2], ['joint 1', 'passive joint'], frameon=False)
 numbers = np.arange(1, len(reached) + 1)
 for label, errors, style in (('predicted', predicted, 'o--'), ('reached', reached, 'o-')):

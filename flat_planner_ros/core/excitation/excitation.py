@@ -286,19 +286,22 @@ class Excitation:
 
     def _fitted(self) -> ModelFit | None:
         """Return the fit of the last motions, None if no plausible model explains them."""
+        heard = _joined(self._parts[-KEPT:])
         if np.ptp(self._parts[-1].positions[:, -2]) < STANDS * self.settings.noise:
             return None
         try:
             # From little that is told a fit tries models that run away.
             with np.errstate(over='ignore', invalid='ignore'):
-                fit = fit_model(_joined(self._parts[-KEPT:]), self._arm)
+                fit = fit_model(heard, self._arm)
         except (FlatPlannerError, np.linalg.LinAlgError):
             return None
         found, believed = (
             np.array([*arm.inertia_star, arm.stiffness]) for arm in (fit.arm, self._arm)
         )
         is_plausible = (np.maximum(found / believed, believed / found) < PLAUSIBLE).all()
-        return fit if is_plausible else None
+        # An arm that sticks may tell of nothing, and the model as it was would move all the more.
+        explains = (fit.residual_rms < heard.positions[:, -2:].std(axis=0)).all()
+        return fit if is_plausible and explains else None
 
     def _told(self, measurements: Measurements) -> FloatArray:
         """Return the information of a motion by the present model and noise, shape (8, 8)."""

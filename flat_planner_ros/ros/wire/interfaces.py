@@ -82,11 +82,15 @@ LATCHED_HISTORY = QoSProfile(
 """The last verdicts, also for those who come later."""
 
 VERDICTS = QoSProfile(
-    depth=256,
+    depth=2 * BURST.depth,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-"""Verdicts as the planner gives them: none is lost of as many goals as may wait at once."""
+"""
+Verdicts as the planner gives them: none is lost of as many goals as may wait at once.
+
+A goal has two where the next one takes its place.
+"""
 
 SENSOR_DATA = qos_profile_sensor_data
 """Measurements: the newest counts; also hears best-effort publishers."""

@@ -17,6 +17,7 @@
 import csv
 import json
 from math import inf
+import os
 from pathlib import Path
 import shlex
 import signal
@@ -286,7 +287,7 @@ def test_a_cluster_writes_the_same_table_whichever_worker_dies(spec, whole, tmp_
         while not (output.exists() and output.read_bytes().count(b'\n') > 8):
             assert process.poll() is None
         victim = next(iter(cluster.workers.values()))
-        victim.process.process.kill()
+        os.kill(victim.pid, signal.SIGKILL)
         assert process.wait(timeout=120) == 0
     assert output.read_text(encoding='utf-8') == whole
 
