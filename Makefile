@@ -42,7 +42,7 @@ export AMENT_PREFIX_PATH := $(CURDIR)/$(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help demo test pytest fuzz soak bench docs examples lint ruff mypy install lock clean FORCE
+.PHONY: help demo test fuzz soak bench docs examples lint install lock clean FORCE
 .DELETE_ON_ERROR:
 
 help:  ## show this list
@@ -56,10 +56,7 @@ demo: install  ## the paper's experiment on the three nodes: table, figures and 
 
 test: export REQUIRE_ROS := 1
 test: export ROS_PYTHON_CHECK_FIELDS := 1
-test: ruff  ## ruff, mypy and all tests
-	@$(MAKE) --no-print-directory --jobs=2 ASIDE='nice -n 19' pytest mypy
-
-pytest: install $(TESTING)
+test: lint  ## ruff, mypy and all tests
 	$(BIN)/python -c '$(PYTEST)' -n 3 --dist loadfile --timeout=300 $(ARGS)
 
 fuzz: export ALL_CASES := 1
@@ -89,15 +86,10 @@ examples: install  ## run examples/, which renews their pictures in docs/images,
 	cp build/examples/*.png docs/images/examples/
 	$(BIN)/flat_plan joint1=pi --duration 1 --animate docs/images/turn.gif >/dev/null
 
-lint: ruff mypy  ## ruff and mypy only
-
-ruff: install $(TESTING)
+lint: install $(TESTING)  ## ruff and mypy only
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m ruff format --check
-
-# Beside the tests it takes what they leave of the processors: nodes that are late fail.
-mypy: install $(TESTING)
-	@if $(BIN)/python -c '$(HAS_TYPES)'; then set -x; $(ASIDE) $(BIN)/python -m mypy; \
+	@if $(BIN)/python -c '$(HAS_TYPES)'; then set -x; $(BIN)/python -m mypy; \
 	else echo 'mypy is left out: it is run with the types of NumPy 2.4 and 2.5 and of Jazzy only'; fi
 
 install: $(PACKAGE)  ## the package as it stands here, with all it needs, into .venv
