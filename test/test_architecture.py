@@ -374,7 +374,7 @@ def test_the_lock_is_hashed_and_names_no_index(name):
     text = (CHECKOUT / name).read_text('utf-8')
     assert not re.search(r'://|^--|@ ', text, re.MULTILINE)
     pinned = re.split(r'^(?=\w)', text, flags=re.MULTILINE)[1:]
-    assert all(re.match(r'[\w.-]+(\[\w,-]+\])?==\S+', entry) for entry in pinned)
+    assert all(re.match(r'[\w.-]+(\[[\w,-]+\])?==\S+', entry) for entry in pinned)
     assert all('--hash=sha256:' in entry for entry in pinned)
 
 
