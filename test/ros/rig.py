@@ -286,14 +286,19 @@ class World(Rig):
         return stamps.now(self.graph.probe.get_clock())
 
     def amplitude(self):
-        """Return what the monitor says of the present motion [rad]."""
+        """Return what the monitor says of this motion [rad]; `Late` if it missed samples."""
 
         def mine():
-            found = map(values, self.reports)
-            return [v for v in found if abs(float(v['start_time']) - self.begin) < 1e-3]
+            own = [
+                r for r in self.reports if abs(float(values(r)['start_time']) - self.begin) < 1e-3
+            ]
+            return own[-1:]
 
         self.graph.expect(mine, 'a report of this motion')
-        return float(mine()[-1].get('amplitude', 'nan'))  # not where samples were missing
+        (report,) = mine()
+        if 'amplitude' not in values(report):
+            raise Late(report.status[0].message)
+        return float(values(report)['amplitude'])
 
     def lateness(self, allowed=0.0):
         """Return all that this arm's plant has said of motions that it could not play in time."""
