@@ -286,9 +286,9 @@ class Excitation:
 
     def _fitted(self) -> ModelFit | None:
         """Return the fit of the last motions, None if no plausible model explains them."""
-        heard = _joined(self._parts[-KEPT:])
         if np.ptp(self._parts[-1].positions[:, -2]) < STANDS * self.settings.noise:
             return None
+        heard = _joined(self._parts[-KEPT:])
         try:
             # From little that is told a fit tries models that run away.
             with np.errstate(over='ignore', invalid='ignore'):

@@ -108,7 +108,7 @@ def _run(settings: SessionSettings, options: Namespace, interrupted: Event) -> i
     seen = excitation.measurements
     fit = fit_model(seen, settings.arm, with_imbalance=True)
     print(fit.text, file=summary)
-    write_files(options, settings.arm, excitation.measurements, fit)
+    write_files(options, settings.arm, seen, fit)
     return 0 if excitation.is_certain and not fit.misfit else 1
 
 
