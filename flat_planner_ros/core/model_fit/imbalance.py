@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.judgement import covariance
 from flat_planner_ros.core.model_fit.last_links import BOTH, IMBALANCE, LAST, STIFFNESS
-from flat_planner_ros.core.model_fit.refinement import Observed, refine, Refined
+from flat_planner_ros.core.model_fit.refinement import refine, Refined
+from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
 
 SCALE = 0.1

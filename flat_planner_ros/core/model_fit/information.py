@@ -28,9 +28,10 @@ from flat_planner_ros.core.model_fit.last_links import (
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
 from flat_planner_ros.core.model_fit.observation import noise_of_links, observed_of, SEGMENT
-from flat_planner_ros.core.model_fit.refinement import CHANNELS, first_starts, linearised, Observed
+from flat_planner_ros.core.model_fit.refinement import linearised
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
 from flat_planner_ros.core.model_fit.signals import segments_of
+from flat_planner_ros.core.model_fit.simulation import CHANNELS, first_starts, Observed
 import numpy as np
 
 

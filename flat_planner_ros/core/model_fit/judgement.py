@@ -17,7 +17,8 @@
 from collections.abc import Sequence
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.model_fit.refinement import CHANNELS, Linearisation
+from flat_planner_ros.core.model_fit.refinement import Linearisation
+from flat_planner_ros.core.model_fit.simulation import CHANNELS
 import numpy as np
 
 LONGEST_LAG = 0.25

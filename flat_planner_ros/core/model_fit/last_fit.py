@@ -41,16 +41,9 @@ from flat_planner_ros.core.model_fit.observation import (
     with_half_the_efforts,
     with_other_times,
 )
-from flat_planner_ros.core.model_fit.refinement import (
-    CHANNELS,
-    first_starts,
-    Linearisation,
-    linearised,
-    Observed,
-    refine,
-    Refined,
-)
+from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, refine, Refined
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
+from flat_planner_ros.core.model_fit.simulation import CHANNELS, first_starts, Observed
 from flat_planner_ros.core.model_fit.starts import settled
 from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
 import numpy as np

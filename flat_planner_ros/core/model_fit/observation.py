@@ -26,7 +26,6 @@ from flat_planner_ros.core.model_fit.measurements import (
     moves_of,
     noise_of,
 )
-from flat_planner_ros.core.model_fit.refinement import Observed
 from flat_planner_ros.core.model_fit.signals import (
     between,
     derivatives,
@@ -35,6 +34,7 @@ from flat_planner_ros.core.model_fit.signals import (
     segments_of,
     span_for,
 )
+from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
 
 SEGMENT = 6.0

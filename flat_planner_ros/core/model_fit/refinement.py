@@ -21,35 +21,29 @@ a long recording stays out, and the work and memory grow with nothing but the nu
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
-    COULOMB,
-    DELAY,
-    Forcing,
-    IMBALANCE,
     LAST,
-    OFFSET,
     STATES,
     step_for,
     STIFFNESS,
-    trajectories,
 )
-from flat_planner_ros.core.model_fit.signals import between, hermite, Segment
+from flat_planner_ros.core.model_fit.simulation import (
+    BLOCK,
+    blocks,
+    CHANNELS,
+    first_starts,
+    Observed,
+    seen_of,
+)
 import numpy as np
 import numpy.typing as npt
 
 DIFFERENCE = 1e-6
 """Step of the difference quotients, relative to the parameters' scales [-]."""
-
-BLOCK = 20
-"""Segments that are simulated side by side: a minute of motion."""
-
-CHUNK = 256
-"""Steps whose states are held at a time: memory does not grow with the recording."""
 
 MOST_STEPS = 40
 """Largest number of linearisations."""
@@ -71,55 +65,6 @@ NULL = 1e-10
 
 NEIGHBOURS = 1 / 6
 """Distance up to which residuals may err alike, relative to a segment [-]: a free period."""
-
-CHANNELS = 2
-"""Angle of link n-1 and of the passive joint."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Observed:
-    """
-    The last two links as measured.
-
-    Attributes
-    ----------
-    times
-        Shape (m,) [s].
-    angles
-        Of link n-1 and of the passive joint, shape (m, 2) [rad].
-    rates
-        Their smoothed velocities, shape (m, 2) [rad/s], for the first guess of the starts.
-    effort
-        Of joint n-1, shape (m,) [N m].
-    base
-        Smoothed angular velocity of link n-2, shape (m,) [rad/s].
-    moves
-        Whether either angle has left the place where its encoder stood, shape (m, 2).
-    rounding
-        Standard deviation of the encoders' rounding in either angle, shape (2,) [rad].
-    segments
-        Pieces to simulate.
-    is_linear
-        Whether efforts go straight from sample to sample, instead of on cubics.
-    refinement
-        By which the steps of the integration are divided [-].
-    turning
-        What a coupling of both links takes from either for each unit, as measured, shape (m, 2)
-        [rad/s^2]; None where none is looked for.
-
-    """
-
-    times: FloatArray
-    angles: FloatArray
-    rates: FloatArray
-    effort: FloatArray
-    base: FloatArray
-    moves: npt.NDArray[np.bool_]
-    rounding: FloatArray
-    segments: Sequence[Segment]
-    is_linear: bool = False
-    refinement: float = 1.0
-    turning: FloatArray | None = None
 
 
 class Linearisation(NamedTuple):
@@ -162,12 +107,6 @@ class Refined(NamedTuple):
     starts: FloatArray
     spread: FloatArray
     around: Linearisation
-
-
-def first_starts(observed: Observed) -> FloatArray:
-    """Return measured states at the starts of the segments, shape (segments, 4)."""
-    first = [segment.first for segment in observed.segments]
-    return np.hstack((observed.angles[first], observed.rates[first]))
 
 
 def linearised(
@@ -316,12 +255,6 @@ def _is_small(step: FloatArray, around: Linearisation, scales: FloatArray) -> bo
     return in_errors < CONVERGED**2 or float(np.abs(step / scales).max()) < SMALLEST
 
 
-def blocks(segments: Sequence[Segment]) -> Iterator[tuple[int, Sequence[Segment]]]:
-    """Yield segments that are simulated side by side, each time with the index of the first."""
-    for first in range(0, len(segments), BLOCK):
-        yield first, segments[first : first + BLOCK]
-
-
 def _segments(
     observed: Observed,
     parameters: FloatArray,
@@ -344,53 +277,3 @@ def _segments(
             by_parameter = slopes[:, :, STATES:] / nudges
             measured = observed.angles[segment.first : segment.last]
             yield middle[:, 0] - measured, by_start, by_parameter
-
-
-def seen_of(
-    observed: Observed, block: Sequence[Segment], models: FloatArray, starts: FloatArray
-) -> list[FloatArray]:
-    """Return for each segment what the sensors would show of every model, (m, models, 2) [rad]."""
-    t = observed.times
-    begins = t[[segment.first for segment in block]]
-    longest = max(float(t[s.last - 1] - t[s.first]) for s in block)
-    step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
-    steps = int(np.ceil(longest / step)) + 1
-    elapsed = [t[s.first : s.last] - begin for s, begin in zip(block, begins, strict=True)]
-    seen = [np.empty((each.size, len(models), CHANNELS)) for each in elapsed]
-    for first in range(0, steps, CHUNK):
-        last = min(first + CHUNK, steps)
-        grid = begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
-        states = trajectories(models, starts, _forcing(observed, models, grid, step))
-        starts = states[-1]
-        for number, angles in enumerate(seen):
-            inside = slice(*np.searchsorted(elapsed[number] / step, (first, last)))
-            share = elapsed[number][inside] / step - first
-            angles[inside] = _between_states(states[..., number], share, step)
-    for angles in seen:
-        angles[..., 1] += models[:, OFFSET]
-    return seen
-
-
-def _between_states(states: FloatArray, at: FloatArray, step: float) -> FloatArray:
-    """Return both angles between states (K + 1, models, 4) at times [steps], (m, models, 2)."""
-    node = at.astype(int)
-    share = (at - node)[:, None, None]
-    here, there = states[node], states[node + 1]
-    ends = here[..., :2], there[..., :2], here[..., 2:], there[..., 2:]
-    return hermite(share, np.array(step), *ends)
-
-
-def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: float) -> Forcing:
-    """Return what moves the models; efforts come later by the delay."""
-    delays, variant = np.unique(models[:, DELAY], return_inverse=True)
-    shifted = grid[:, None, :] - delays[:, None]
-    if observed.is_linear:
-        effort = np.interp(shifted, observed.times, observed.effort)
-    else:
-        effort = between(observed.times, observed.effort, shifted)
-    base = between(observed.times, observed.base, grid) if observed.base.any() else 0.0 * grid
-    turning = None
-    if observed.turning is not None and models.shape[1] > IMBALANCE:
-        each = [between(observed.times, column, grid) for column in observed.turning.T]
-        turning = np.stack(each, axis=1)
-    return Forcing(step, effort, variant, base, turning)

@@ -26,7 +26,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     STIFFNESS,
     VISCOUS,
 )
-from flat_planner_ros.core.model_fit.refinement import Observed
+from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
 
 LIGHT_DAMPING = 0.01

@@ -24,15 +24,15 @@ from collections.abc import Sequence
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.last_links import STATES
-from flat_planner_ros.core.model_fit.refinement import (
+from flat_planner_ros.core.model_fit.refinement import DIFFERENCE
+from flat_planner_ros.core.model_fit.signals import Segment
+from flat_planner_ros.core.model_fit.simulation import (
     BLOCK,
     blocks,
-    DIFFERENCE,
     first_starts,
     Observed,
     seen_of,
 )
-from flat_planner_ros.core.model_fit.signals import Segment
 import numpy as np
 
 REST = 5

@@ -16,8 +16,9 @@
 
 import tracemalloc
 
-from flat_planner_ros.core.model_fit.refinement import linearised, Observed
+from flat_planner_ros.core.model_fit.refinement import linearised
 from flat_planner_ros.core.model_fit.signals import Segment
+from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
 
 MODEL = np.array([7e-4, 3e-5, 2.7e-3, 2.5e-5, 2e-4, 5e-4, 0.0, 0.0])

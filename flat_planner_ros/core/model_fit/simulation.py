@@ -1,0 +1,154 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The last two links as measured, and what the sensors would show of a model.
+
+Pieces of a recording are simulated side by side, and a bounded number of steps at a time: memory
+grows with neither.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.last_links import (
+    COULOMB,
+    DELAY,
+    Forcing,
+    IMBALANCE,
+    OFFSET,
+    step_for,
+    trajectories,
+)
+from flat_planner_ros.core.model_fit.signals import between, hermite, Segment
+import numpy as np
+import numpy.typing as npt
+
+BLOCK = 20
+"""Segments that are simulated side by side: a minute of motion."""
+
+CHUNK = 256
+"""Steps whose states are held at a time: memory does not grow with the recording."""
+
+CHANNELS = 2
+"""Angle of link n-1 and of the passive joint."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Observed:
+    """
+    The last two links as measured.
+
+    Attributes
+    ----------
+    times
+        Shape (m,) [s].
+    angles
+        Of link n-1 and of the passive joint, shape (m, 2) [rad].
+    rates
+        Their smoothed velocities, shape (m, 2) [rad/s], for the first guess of the starts.
+    effort
+        Of joint n-1, shape (m,) [N m].
+    base
+        Smoothed angular velocity of link n-2, shape (m,) [rad/s].
+    moves
+        Whether either angle has left the place where its encoder stood, shape (m, 2).
+    rounding
+        Standard deviation of the encoders' rounding in either angle, shape (2,) [rad].
+    segments
+        Pieces to simulate.
+    is_linear
+        Whether efforts go straight from sample to sample, instead of on cubics.
+    refinement
+        By which the steps of the integration are divided [-].
+    turning
+        What a coupling of both links takes from either for each unit, as measured, shape (m, 2)
+        [rad/s^2]; None where none is looked for.
+
+    """
+
+    times: FloatArray
+    angles: FloatArray
+    rates: FloatArray
+    effort: FloatArray
+    base: FloatArray
+    moves: npt.NDArray[np.bool_]
+    rounding: FloatArray
+    segments: Sequence[Segment]
+    is_linear: bool = False
+    refinement: float = 1.0
+    turning: FloatArray | None = None
+
+
+def first_starts(observed: Observed) -> FloatArray:
+    """Return measured states at the starts of the segments, shape (segments, 4)."""
+    first = [segment.first for segment in observed.segments]
+    return np.hstack((observed.angles[first], observed.rates[first]))
+
+
+def blocks(segments: Sequence[Segment]) -> Iterator[tuple[int, Sequence[Segment]]]:
+    """Yield segments that are simulated side by side, each time with the index of the first."""
+    for first in range(0, len(segments), BLOCK):
+        yield first, segments[first : first + BLOCK]
+
+
+def seen_of(
+    observed: Observed, block: Sequence[Segment], models: FloatArray, starts: FloatArray
+) -> list[FloatArray]:
+    """Return for each segment what the sensors would show of every model, (m, models, 2) [rad]."""
+    t = observed.times
+    begins = t[[segment.first for segment in block]]
+    longest = max(float(t[s.last - 1] - t[s.first]) for s in block)
+    step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
+    steps = int(np.ceil(longest / step)) + 1
+    elapsed = [t[s.first : s.last] - begin for s, begin in zip(block, begins, strict=True)]
+    seen = [np.empty((each.size, len(models), CHANNELS)) for each in elapsed]
+    for first in range(0, steps, CHUNK):
+        last = min(first + CHUNK, steps)
+        grid = begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
+        states = trajectories(models, starts, _forcing(observed, models, grid, step))
+        starts = states[-1]
+        for number, angles in enumerate(seen):
+            inside = slice(*np.searchsorted(elapsed[number] / step, (first, last)))
+            share = elapsed[number][inside] / step - first
+            angles[inside] = _between_states(states[..., number], share, step)
+    for angles in seen:
+        angles[..., 1] += models[:, OFFSET]
+    return seen
+
+
+def _between_states(states: FloatArray, at: FloatArray, step: float) -> FloatArray:
+    """Return both angles between states (K + 1, models, 4) at times [steps], (m, models, 2)."""
+    node = at.astype(int)
+    share = (at - node)[:, None, None]
+    here, there = states[node], states[node + 1]
+    ends = here[..., :2], there[..., :2], here[..., 2:], there[..., 2:]
+    return hermite(share, np.array(step), *ends)
+
+
+def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: float) -> Forcing:
+    """Return what moves the models; efforts come later by the delay."""
+    delays, variant = np.unique(models[:, DELAY], return_inverse=True)
+    shifted = grid[:, None, :] - delays[:, None]
+    if observed.is_linear:
+        effort = np.interp(shifted, observed.times, observed.effort)
+    else:
+        effort = between(observed.times, observed.effort, shifted)
+    base = between(observed.times, observed.base, grid) if observed.base.any() else 0.0 * grid
+    turning = None
+    if observed.turning is not None and models.shape[1] > IMBALANCE:
+        each = [between(observed.times, column, grid) for column in observed.turning.T]
+        turning = np.stack(each, axis=1)
+    return Forcing(step, effort, variant, base, turning)
