@@ -17,7 +17,9 @@ Goals of a planner in a process of its own, beside a plant and a monitor: how so
 
 Single goals from rest to rest, and goals streamed to a target that moves. Times are those of a
 client in another process: from its publishing the goal to its hearing the command and the verdict,
-both ways through the middleware. `python benchmarks/run.py goal_stream` runs this alone.
+both ways through the middleware. A node that answers with messages made beforehand, and works on
+nothing, shows what of it is the middleware's and the executor's (`bare_planner.py`).
+`python benchmarks/run.py goal_stream` runs this alone.
 """
 
 from argparse import Namespace
@@ -32,7 +34,7 @@ from flat_planner_ros.ros.wire import interfaces, stamps
 from measurement import duration_text, Section, verdict
 import numpy as np
 import problem
-from processes import Listener, listener, NodeProcess, processes, SHIPPED
+from processes import BARE_PLANNER, Listener, listener, NodeProcess, processes, SHIPPED
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -46,11 +48,18 @@ DURATION = 0.5
 PAUSE = 0.6
 """From one goal from rest to the next [s]: the motion, and the time until it starts."""
 
-TARGETS = {'median': 1e-3, 'p99': 2e-3, 'verdict': 2e-3}
-"""From a single goal to its command, and to its verdict [s]."""
+TARGETS = (
+    ('command, median,', 0, 50.0, 1e-3),
+    ('command, 99th percentile,', 0, 99.0, 2e-3),
+    ('verdict, median,', 1, 50.0, 2e-3),
+)
+"""From a single goal to its command (0) or its verdict (1): percentile, target [s]."""
 
 RATES = (50.0, 200.0)
 """Of the streams [Hz]."""
+
+FLOOR = 1.3
+"""Times over those of the bare node that do where a target is out of its reach already [-]."""
 
 PATIENCE = 5.0
 """Time after the last goal in which all are to be answered [s]."""
@@ -164,9 +173,9 @@ class _Client:
 
 
 @contextmanager
-def _nodes() -> Iterator[tuple[NodeProcess, _Client]]:
+def _nodes(name: str = 'planner') -> Iterator[tuple[NodeProcess, _Client]]:
     """Let a planner, a plant and a monitor live for a while, and a client beside them."""
-    planner = NodeProcess('planner', SHIPPED, {'sampling.period': f'{PERIOD:g}'})
+    planner = NodeProcess(name, SHIPPED, {'sampling.period': f'{PERIOD:g}'})
     others = NodeProcess('plant', SHIPPED, {}), NodeProcess('monitor', SHIPPED, {})
     with processes(planner, *others), listener('goals_client') as ours:
         client = _Client(ours)
@@ -177,50 +186,61 @@ def _nodes() -> Iterator[tuple[NodeProcess, _Client]]:
         assert planner.is_running(), planner.log
 
 
-def _single_section(count: int) -> Section:
-    """Measure goals that come while the arm rests."""
-    with _nodes() as (planner, client):
+def _single_delays(name: str, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the times from goals that come at rest to commands and to verdicts [s]."""
+    with _nodes(name) as (planner, client):
         client.at_rate(1.0 / PAUSE, count, lambda time: 0.3 + 0.1 * sin(1e3 * time))
         assert client.accepted == count, planner.warnings[:3]
     command = client.delays(client.commanded)
     judged = client.delays([time for time, _ in client.judged])
     assert command is not None, 'one command for each goal'
     assert judged is not None, 'one verdict for each goal'
-    median, late = np.percentile(command, (50, 99))
-    told = float(np.median(judged))
+    return command, judged
+
+
+def _single_section(count: int) -> Section:
+    """Measure goals that come while the arm rests."""
+    ours, bare = _single_delays('planner', count), _single_delays(BARE_PLANNER, count)
+    notes = []
+    for name, index, share, target in TARGETS:
+        value, least = (float(np.percentile(delays[index], share)) for delays in (ours, bare))
+        notes.append(
+            f'{name} within {duration_text(target)} or {FLOOR:g} times the bare node: '
+            f'{verdict(value <= max(target, FLOOR * least))}, {value / least:.2f} times'
+        )
     return Section(
         f'Single goals, planner, plant and monitor at work, {round(DURATION / PERIOD) + 1} points',
-        ('from the goal to', 'median', 'p99', 'worst'),
-        [_delay_row('the command', command), _delay_row('the verdict', judged)],
+        (f'from the goal to, {count} goals', 'median', 'p99', 'worst'),
         [
-            f'{count} goals; command within {duration_text(TARGETS["median"])} (median): '
-            f'{verdict(median <= TARGETS["median"])}, {duration_text(TARGETS["p99"])} (p99): '
-            f'{verdict(late <= TARGETS["p99"])}; verdict within '
-            f'{duration_text(TARGETS["verdict"])}: {verdict(told <= TARGETS["verdict"])}'
+            _delay_row('the command', ours[0]),
+            _delay_row('the command, a bare node', bare[0]),
+            _delay_row('the verdict', ours[1]),
+            _delay_row('the verdict, a bare node', bare[1]),
         ],
+        notes,
     )
 
 
 def _stream_section(seconds: float) -> Section:
     """Measure goals that follow a moving target."""
     rows, notes = [], []
-    for rate in RATES:
+    for name, rate in [*(('planner', rate) for rate in RATES), (BARE_PLANNER, max(RATES))]:
         count = round(rate * seconds)
-        with _nodes() as (planner, client):
+        with _nodes(name) as (planner, client):
             client.at_rate(rate, count, lambda time: AMPLITUDE * sin(2.0 * pi * FREQUENCY * time))
             usage, accepted = planner.look(), client.accepted
-            left = client.residual(problem.arm())
-        row = _delay_row(f'{rate:g} Hz', client.delays(client.commanded))
+            left = client.residual(problem.arm()) if name != BARE_PLANNER else None
+        label, *delays = _delay_row(f'{rate:g} Hz', client.delays(client.commanded))
         rows.append(
             (
-                row[0],
+                label if left is not None else f'{label}, a bare node',
                 f'{accepted} of {count}',
                 f'{100.0 * usage.share:.0f} %',
-                *row[1:],
-                f'{left:.1e}',
+                *delays,
+                '-' if left is None else f'{left:.1e}',
             )
         )
-        if rate == max(RATES):
+        if left is not None and rate == max(RATES):
             is_met = accepted == count and usage.share <= SHARE
             notes.append(
                 f'{rate:g} Hz, all accepted with at most {100.0 * SHARE:.0f} % of a core: '

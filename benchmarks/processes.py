@@ -44,6 +44,12 @@ BARE = 'bare'
 BARE_ANSWER = '/bare/answer'
 """Its service."""
 
+BARE_PLANNER = 'bare planner'
+"""Name of a node of rclpy that answers goals with messages made beforehand, `bare_planner.py`."""
+
+PROGRAMS = {BARE: 'bare_node.py', BARE_PLANNER: 'bare_planner.py'}
+"""Files of the nodes that are not the package's."""
+
 STAMP = struct.Struct('<iI')
 """Seconds and nanoseconds, behind the four bytes that start a serialised message."""
 
@@ -72,7 +78,7 @@ class NodeProcess:
     Parameters
     ----------
     name
-        `planner`, `plant`, `monitor` or `BARE`.
+        `planner`, `plant`, `monitor` or one of `PROGRAMS`.
     executor
         What spins it.
     parameters : dict[str, str]
@@ -89,8 +95,8 @@ class NodeProcess:
         # What `ros2 run` starts.
         entry = f'from flat_planner_ros.programs import {name}_node as run'
         program = ['-c', f'{entry}; raise SystemExit(run())']
-        if name == BARE:
-            program = [str(Path(__file__).parent / 'bare_node.py')]
+        if name in PROGRAMS:
+            program = [str(Path(__file__).parent / PROGRAMS[name])]
         elif executor != SHIPPED:
             program = [str(Path(__file__).parent / 'spin_node.py'), name, executor]
         values = [f'{key}:={value}' for key, value in parameters.items()]
