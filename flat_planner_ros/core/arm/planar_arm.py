@@ -353,8 +353,9 @@ class PlanarArm(ArmDynamics):
             axis, and the counterbalance that would mend it.
 
         """
+        moments, masses = self.static_moment.tolist(), self.carried_mass.tolist()
         for i in (self.n - 1, self.n - 2):
-            moment, mass = float(self.static_moment[i]), float(self.carried_mass[i])
+            moment, mass = moments[i], masses[i]
             limit = BALANCE_TOLERANCE * sqrt(mass * self.inertia[i, i])
             if abs(moment) > limit:
                 raise NotFlat(

@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.roots import Cluster
+from flat_planner_ros.core.motion_law.term_sum import power_factors
 from flat_planner_ros.core.motion_law.terms import leibniz, Number, series_derivatives, Term
 import numpy as np
 from numpy.typing import NDArray
@@ -117,12 +118,16 @@ class Block(NamedTuple):
         Their derivatives 0 to 5 at x = 1, a list of six numbers each.
     solutions
         The solutions; those with an origin at the end without their mirror images.
+    powers
+        Of those around zero, factors of ascending powers in the derivatives 0 to 12, shape
+        (functions, 13, terms); None for others.
 
     """
 
     growth: float
     columns: list[list[float]]
     solutions: Solutions
+    powers: FloatArray | None = None
 
 
 def block_of(cluster: Cluster, parity: float) -> Block:
@@ -169,7 +174,8 @@ def _central(factor: bytes, parity: float) -> Block:
     last = np.flatnonzero(terms.any(axis=0))[-1]
     series = terms[:, : last + 1] / _FACTORIALS[: last + 1]
     columns = series_derivatives(series, CONDITIONS - 1).sum(axis=1).tolist()
-    return Block(max(1.0, _spread(even)), columns, Solutions(0j, 0, series))
+    growth = max(1.0, _spread(even))
+    return Block(growth, columns, Solutions(0j, 0, series), power_factors(series))
 
 
 def _exponentials(beta: complex, parity: float) -> Block:

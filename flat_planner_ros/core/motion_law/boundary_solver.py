@@ -42,6 +42,11 @@ class BoundarySolver:
     parity
         1 for the even solutions, -1 for the odd ones.
 
+    Attributes
+    ----------
+    rates : ComplexArray
+        Rates of the solutions, without mirror images, shape (m,) [-].
+
     Raises
     ------
     UncertifiedPlan
@@ -56,17 +61,14 @@ class BoundarySolver:
         columns = [column for block in blocks for column in block.columns]
         self._parity = parity
         self._solutions = [block.solutions for block in blocks]
+        self._powers = blocks[0].powers
+        self.rates: ComplexArray = np.array([each.rate for each in self._solutions])
         self._rows = row_factors([b.growth for b in blocks for _ in b.columns])
         self._matrix = (self._rows * np.array(columns)).T
         try:
             self._inverse = np.linalg.inv(self._matrix)
         except np.linalg.LinAlgError as error:
             raise UncertifiedPlan('boundary residual', np.inf, 0.0) from error
-
-    @property
-    def rates(self) -> ComplexArray:
-        """Return the rates of the solutions, without mirror images, shape (m,) [-]."""
-        return np.array([solutions.rate for solutions in self._solutions])
 
     def terms(self, target: FloatArray) -> list[Term]:
         """Return the terms of the combination of solutions that meets derivatives 0 to 5."""
@@ -79,17 +81,19 @@ class BoundarySolver:
 
     def total(self, target: FloatArray) -> TermSum:
         """Return the sum of these terms, ready for evaluation."""
-        around_zero, *others = self._solutions
-        if around_zero.series is None or any(each.series is not None for each in others):
+        others = self._solutions[1:]
+        if self._powers is None or any(each.series is not None for each in others):
             return term_sum(self.terms(target))
         # No roots but zero have company: exponentials, with a mirror image each, and powers.
         amplitudes = self._amplitudes(target)
-        count = around_zero.size
+        count, orders, terms = self._powers.shape
+        powers = amplitudes[:count] @ self._powers.reshape(count, orders * terms)
         exponentials = combined(others, amplitudes[count:].tolist())
         at_end = np.array([term.coefficients for term in exponentials], dtype=complex)
-        decays = np.array([term.rate for term in exponentials], dtype=complex)
-        series = amplitudes[:count] @ around_zero.series.real
-        factors = plain_factors(decays, at_end.reshape(-1, 1) * [self._parity, 1.0], series)
+        decays = self.rates[1:]
+        factors = plain_factors(
+            decays, at_end.reshape(-1, 1) * [self._parity, 1.0], powers.reshape(orders, terms)
+        )
         return TermSum(decays=decays, factors=factors, others=())
 
     def _amplitudes(self, target: FloatArray) -> FloatArray:

@@ -159,16 +159,16 @@ def effort_square(flat_map: FlatMap, r: float, p: float) -> FloatArray:
     """Return Q of the squared effort, weighted with r^8, (18) of docs/derivation.md."""
     del p
     effort = flat_map.effort[1:]
-    with np.errstate(over='ignore', invalid='ignore'):
-        weighted = r ** (WEIGHT_EXPONENT // 2) * effort
-    largest = float(np.abs(weighted).max())
+    factor = r ** (WEIGHT_EXPONENT // 2)
+    largest = factor * max(map(abs, effort.tolist()))
     if not largest < MAX_FACTOR:
         raise InvalidCost(
             f'effort weighted with r = {r:g} is up to {largest:.3g}, beyond {MAX_FACTOR:g}: '
             f'the model has numbers that no arm has'
         )
+    weighted = factor * effort
     matrix = np.zeros((ORDER, ORDER))
-    matrix[: len(effort), : len(effort)] = np.multiply.outer(weighted, weighted)
+    matrix[: len(effort), : len(effort)] = weighted[:, None] * weighted
     return matrix
 
 

@@ -33,13 +33,13 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import ComplexArray, FloatArray
-from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
+from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS, SERIES_LENGTH
 from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, SummedLaw
 from flat_planner_ros.core.motion_law.roots import Spectrum
 from flat_planner_ros.core.motion_law.slow_law import SLOW, slow_law, speeds
-from flat_planner_ros.core.motion_law.term_sum import term_sum, TermSum
+from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum, TermSum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
 
@@ -148,9 +148,9 @@ def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
         magnitudes [-].
 
     """
-    even = jet[2::2]
-    size = float((np.abs(coefficients[1:]) @ np.abs(even)).max())
-    return float(np.abs(coefficients[1:] @ even).max()) / size if size > 0.0 else 0.0
+    weights, even = coefficients[1:], jet[2::2]
+    size = float((np.abs(weights) @ np.abs(even)).max())
+    return float(np.abs(weights @ even).max()) / size if size > 0.0 else 0.0
 
 
 def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
@@ -324,7 +324,7 @@ def _certified(coefficients: FloatArray) -> UnitMotion:
     """Return a unit motion with its residuals."""
     total, rates = unit_law(coefficients)
     law = SummedLaw(duration=2.0, total=total)
-    jet = law.normalised_jet(probes(), 2 * CONDITIONS)
+    jet = total.at(probes(), 2 * CONDITIONS, _powers_at_probes())
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
     # Relative to the start, as the value's own peak is the distance.
     sizes = peaks[:CONDITIONS] + UNIT_ENDS[:, 1]
@@ -352,3 +352,9 @@ def probes() -> FloatArray:
     times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
     times = np.append(times, 2.0)
     return np.array([times, 2.0 - times])
+
+
+@cache
+def _powers_at_probes() -> FloatArray:
+    """Return powers of x at the times of the certificate, as many as a law can have."""
+    return locked(ascending_powers(probes(), SERIES_LENGTH))

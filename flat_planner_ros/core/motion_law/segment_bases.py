@@ -34,7 +34,7 @@ from flat_planner_ros.core.motion_law.basis import (
     Solutions,
 )
 from flat_planner_ros.core.motion_law.roots import Spectrum
-from flat_planner_ros.core.motion_law.term_sum import Mixed, plain_factors, TermSums
+from flat_planner_ros.core.motion_law.term_sum import Mixed, plain_factors, power_factors, TermSums
 from flat_planner_ros.core.motion_law.terms import leibniz, series_derivatives, TOP_ORDER, trimmed
 import numpy as np
 from numpy.typing import NDArray
@@ -254,7 +254,9 @@ class _Kind:
             decays=decays,
             # Real part, and minus the imaginary one; those of images count from the start.
             factors=plain_factors(
-                decays, (at_ends[..., 0] - 1j * at_ends[..., 1])[..., ::-1], series
+                decays,
+                (at_ends[..., 0] - 1j * at_ends[..., 1])[..., ::-1],
+                power_factors(series),
             ),
             others=tuple(zip(*others, strict=True)) if others else ((),) * len(ratios),
         )

@@ -21,7 +21,7 @@ matrix product gives every derivative at every time; the others are summed one b
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
@@ -81,7 +81,9 @@ class TermSum:
     factors: FloatArray
     others: tuple[Mixed, ...]
 
-    def at(self, distances: FloatArray, order: int) -> FloatArray:
+    def at(
+        self, distances: FloatArray, order: int, powers: FloatArray | None = None
+    ) -> FloatArray:
         """
         Return the sum and its derivatives in x.
 
@@ -91,6 +93,8 @@ class TermSum:
             From the start and from the end, x + 1 and 1 - x, both exact, shape (2, m).
         order
             Highest derivative wanted.
+        powers
+            `ascending_powers` of x, as many as the sum has terms or more; formed if not given.
 
         Returns
         -------
@@ -98,7 +102,7 @@ class TermSum:
             Row k holds the k-th derivative, shape (order + 1, m).
 
         """
-        result = plain_sums(self.decays, self.factors[: order + 1], distances)
+        result = plain_sums(self.decays, self.factors[: order + 1], distances, powers)
         if self.others:
             self.add_others(result, distances)
         return result
@@ -122,7 +126,6 @@ class TermSum:
         size, places, x = grid_blocks(intervals)
         factors = scales[:, None] * self.factors[:orders]
         amplitudes = factors[:, None, : 4 * count].view(complex)
-        signs = _odd_signs(orders)
         mirrored = table[:, ::-1]
         with np.errstate(under='ignore'):
             tables = self._grid_tables(size, places) if count else None
@@ -134,13 +137,15 @@ class TermSum:
                 if tables is not None:
                     fine, coarse = tables
                     blocks = coarse[start // size : -(-stop // size)]
-                    scaled = (amplitudes * blocks).view(float)
+                    scaled = np.multiply(amplitudes, blocks, order='C').view(float)
                     product = scaled.reshape(orders * len(blocks), 4 * count) @ fine
                     part += product.reshape(orders, -1)[:, : stop - start]
                 if self.others:
                     distances = np.array([1.0 + x[start:stop], 1.0 - x[start:stop]])
                     self.add_others(part, distances, scales)
-                np.multiply(part, signs, out=mirrored[:, start:stop])
+                # Derivatives of even order are odd about the middle.
+                np.negative(part[::2], out=mirrored[::2, start:stop])
+                mirrored[1::2, start:stop] = part[1::2]
                 table[:, start:stop] = part
 
     def _grid_tables(self, size: int, places: FloatArray) -> tuple[FloatArray, ComplexArray]:
@@ -162,7 +167,7 @@ class TermSum:
         split_parts(fall[:, :size], fine[:, 0])
         fine[:, 1] = fine[:, 0, :, ::-1]
         blocks = (len(places) - size) // 2
-        coarse = fall[:, size:].reshape(2 * len(fall), blocks).T.copy()
+        coarse = fall[:, size:].reshape(2 * len(fall), blocks).T
         return fine.reshape(4 * len(fall), size), coarse
 
     @np.errstate(under='ignore')
@@ -228,7 +233,12 @@ class TermSums:
         return [TermSum(decays=d, factors=f, others=others) for d, f, others in parts]
 
 
-def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray) -> FloatArray:
+def plain_sums(
+    decays: ComplexArray,
+    factors: FloatArray,
+    distances: FloatArray,
+    powers: FloatArray | None = None,
+) -> FloatArray:
     """
     Return sums of terms, and their derivatives in x, without those that are neither.
 
@@ -239,6 +249,8 @@ def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray)
         (..., orders, 4 m + terms).
     distances
         From the start and from the end, x + 1 and 1 - x, both exact, shape (2, places).
+    powers
+        As `TermSum.at` takes them.
 
     Returns
     -------
@@ -254,8 +266,11 @@ def plain_sums(decays: ComplexArray, factors: FloatArray, distances: FloatArray)
             fall = -decays[..., None, None] * distances
             np.exp(fall, out=fall)
             split_parts(fall, basis[..., : 4 * count, :].reshape(*decays.shape, 2, 2, places))
-        rows = basis.swapaxes(-2, 0)
-        _fill_powers(rows[4 * count :], 0.5 * (distances[0] - distances[1]))
+        rows = basis.swapaxes(-2, 0)[4 * count :]
+        if powers is None:
+            _fill_powers(rows, 0.5 * (distances[0] - distances[1]))
+        else:
+            rows[:] = powers[: len(rows)]
         sums: FloatArray = factors @ basis
     return sums
 
@@ -279,12 +294,32 @@ def term_sum(terms: Sequence[Term], order: int = TOP_ORDER) -> TermSum:
         total[: len(coefficients)] += np.real(coefficients)
     decays = np.array(list(ends), dtype=complex)
     at_ends = np.array(list(ends.values()), dtype=complex).reshape(-1, 2)
-    factors = plain_factors(decays, at_ends, total, order)
+    factors = plain_factors(decays, at_ends, power_factors(total, order))
     return TermSum(decays=decays, factors=factors, others=tuple(others))
 
 
+def power_factors(series: FloatArray, order: int = TOP_ORDER) -> FloatArray:
+    """
+    Return the factors of powers in the derivatives of power series.
+
+    Parameters
+    ----------
+    series
+        Coefficients of ascending powers, shape (..., terms).
+    order
+        Highest derivative.
+
+    Returns
+    -------
+    FloatArray
+        Shape (..., order + 1, terms), without the powers that no derivative needs.
+
+    """
+    return trimmed(series_derivatives(series, order), 1.0).swapaxes(-1, -2)
+
+
 def plain_factors(
-    decays: ComplexArray, amplitudes: ComplexArray, series: FloatArray, order: int = TOP_ORDER
+    decays: ComplexArray, amplitudes: ComplexArray, powers: FloatArray
 ) -> FloatArray:
     """
     Return the factors of a `TermSum`, of one or several sums.
@@ -295,38 +330,33 @@ def plain_factors(
         As those of a `TermSum`, shape (..., m).
     amplitudes
         Of the exponentials counted from the start and from the end, shape (..., m, 2).
-    series
-        Coefficients of ascending powers, shape (..., terms).
-    order
-        Highest derivative.
+    powers
+        Factors of ascending powers of x in every derivative, shape (..., orders, terms).
 
     Returns
     -------
     FloatArray
-        Shape (..., order + 1, 4 m + terms), without the powers that no derivative needs.
+        Shape (..., orders, 4 m + terms).
 
     """
     count = decays.shape[-1]
-    table = np.empty((*decays.shape[:-1], order + 1, count, 2), dtype=complex)
+    factors = np.empty((*powers.shape[:-1], 4 * count + powers.shape[-1]))
+    factors[..., 4 * count :] = powers
     if count:
-        table[..., 0, :, :] = amplitudes
+        ends = factors[..., : 4 * count].view(complex).reshape(*powers.shape[:-1], count, 2)
+        ends[..., 0, :, :] = amplitudes
         # Counted from the start, an exponential that falls has the rate -d.
-        table[..., 1:, :, 0] = -decays[..., None, :]
-        table[..., 1:, :, 1] = decays[..., None, :]
-        np.multiply.accumulate(table, axis=-3, out=table)
-    factors = table.reshape(*table.shape[:-2], 2 * count).view(float)
-    if series.shape[-1]:
-        powers = trimmed(series_derivatives(series, order), 1.0)
-        factors = np.concatenate([factors, powers.swapaxes(-1, -2)], axis=-1)
+        ends[..., 1:, :, 0] = -decays[..., None, :]
+        ends[..., 1:, :, 1] = decays[..., None, :]
+        np.multiply.accumulate(ends, axis=-3, out=ends)
     return factors
 
 
-@cache
-def _odd_signs(orders: int) -> FloatArray:
-    """Return the signs of the derivatives of an odd function at the mirrored place, (m, 1)."""
-    signs = np.ones((orders, 1))
-    signs[::2] = -1.0
-    return signs
+def ascending_powers(distances: FloatArray, count: int) -> FloatArray:
+    """Return 1, x, x^2, ... at distances from the start and from the end, shape (count, m)."""
+    powers = np.empty((count, distances.shape[1]))
+    _fill_powers(powers, 0.5 * (distances[0] - distances[1]))
+    return powers
 
 
 def _fill_powers(table: FloatArray, x: FloatArray) -> None:
