@@ -182,8 +182,12 @@ class _Search:
             trial = self._try(self.shortest)
             if trial.obeys and trial.plan is not None:
                 return trial.plan
-        self._bracket()
+        self._bracket(self.first)
         self._refine()
+        if not self._is_confirmed():
+            # What seemed to obey by samples does not: more often than not, a little more will.
+            self._bracket(max(self.trials))
+            self._refine()
         if not self._is_confirmed():
             self._scan(self.shortest, self.longest)
             self._refuse_if_none()
@@ -256,10 +260,10 @@ class _Search:
         """Tell whether the peaks of nearly the same duration are known."""
         return 1.0 / NARROW < duration / self.peaks_of < NARROW
 
-    def _bracket(self) -> None:
+    def _bracket(self, first: float) -> None:
         """Look, by samples, for one duration that seems to obey above one that does not."""
         stride = FIRST_STRIDE
-        trial = self._glance(self.first)
+        trial = self._glance(first)
         descends = trial.ratio <= 1.0
         while (trial.ratio <= 1.0) == descends:
             here = trial.duration
@@ -332,7 +336,8 @@ class _Search:
             if not self._is_ruled_out(duration) and self._try_briefly(duration).is_hopeless:
                 return
             duration /= SCAN_STEP
-        self._try_briefly(low)
+        if not self._is_content:
+            self._try_briefly(low)
 
     def _is_ruled_out(self, duration: float) -> bool:
         """Tell whether a limit is exceeded by nearly the same on both sides: a static load."""
