@@ -40,7 +40,11 @@ from flat_planner_ros.core.planning.request import (
     RequestRejected,
     ViaPoint,
 )
-from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+from flat_planner_ros.core.planning.shortest_duration import (
+    IsOver,
+    NoFeasibleDuration,
+    shortest_plan,
+)
 from flat_planner_ros.core.planning.stop import stop_plan
 from flat_planner_ros.core.planning.strategies import check_options, OWN_LAWS, shortest_known
 from flat_planner_ros.core.planning.tradeoff import (
@@ -81,6 +85,7 @@ __all__ = [
     'MAX_WEIGHT',
     'MotionRequest',
     'NO_DISTANCE',
+    'IsOver',
     'NoFeasibleDuration',
     'OnViolation',
     'OPTIMALITY_TOLERANCE',

@@ -29,7 +29,11 @@ from flat_planner_ros.core.planning.request import (
     Reason,
     RequestRejected,
 )
-from flat_planner_ros.core.planning.shortest_duration import NoFeasibleDuration, shortest_plan
+from flat_planner_ros.core.planning.shortest_duration import (
+    IsOver,
+    NoFeasibleDuration,
+    shortest_plan,
+)
 from flat_planner_ros.core.planning.strategies import shortest_known
 
 REASONS = {
@@ -110,6 +114,7 @@ class DurationRules:
         *,
         is_prescribed: bool,
         first: float | None = None,
+        is_over: IsOver | None = None,
     ) -> tuple[Plan, LimitUse | None]:
         """
         Return the plan of a motion within the limits, and what stretched it.
@@ -123,6 +128,9 @@ class DurationRules:
             obeys the limits is.
         first
             Where the search for the shortest starts [s], if something is known of it.
+        is_over
+            Tells when the search has to be content with a duration that obeys; None for never.
+            A refusal has the shortest one all the same.
 
         Returns
         -------
@@ -146,7 +154,9 @@ class DurationRules:
         limit = float(self.limits.effort[-2])
         if not is_prescribed:
             bound = shortest_known(request, arm, options, limit)
-            found = self._shortest(plan_of, self.shortest, bound=bound, first=first)
+            found = self._shortest(
+                plan_of, self.shortest, bound=bound, first=first, is_over=is_over
+            )
             return self._gentle(plan_of, found), None
         prescribed = plan(request, arm, options)
         use = self.limits.worst(prescribed)
@@ -156,13 +166,23 @@ class DurationRules:
         # To stretch is to take longer, even if something shorter obeys as well.
         shortest = request.duration if scales else self.shortest
         bound = shortest_known(request, arm, options, limit)
-        found = self._shortest(plan_of, shortest, use, bound)
+        is_over = is_over if scales else None
+        found = self._shortest(
+            plan_of, shortest, use, bound, first=request.duration, is_over=is_over
+        )
         if scales:
             return found, use
         remedy = f'the shortest feasible duration is {found.duration:.9g} s'
         raise self._rejection(use, f'{self._sentence(use)}; {remedy}', found.duration)
 
-    def shortest_of(self, plan_of: Callable[[float], Plan], *, most: int) -> Plan:
+    def shortest_of(
+        self,
+        plan_of: Callable[[float], Plan],
+        *,
+        most: int,
+        first: float | None = None,
+        is_over: IsOver | None = None,
+    ) -> Plan:
         """
         Return the shortest plan that obeys the limits.
 
@@ -172,6 +192,8 @@ class DurationRules:
             Plan of a duration [s].
         most
             Durations that are tried, about.
+        first, is_over
+            As for `plan_within`.
 
         Raises
         ------
@@ -179,7 +201,7 @@ class DurationRules:
             None of them obeys.
 
         """
-        return self._shortest(plan_of, self.shortest, most=most)
+        return self._shortest(plan_of, self.shortest, most=most, first=first, is_over=is_over)
 
     def _gentle(self, plan_of: Callable[[float], Plan], shortest: Plan) -> Plan:
         """Return the plan that takes `factor` times the shortest, unless a limit forbids that."""
@@ -198,6 +220,7 @@ class DurationRules:
         bound: float | None = None,
         first: float | None = None,
         most: int | None = None,
+        is_over: IsOver | None = None,
     ) -> Plan:
         """Return the shortest plan, or reject by what a prescribed one, or the best, exceeds."""
         try:
@@ -209,6 +232,7 @@ class DurationRules:
                 bound=bound,
                 first=first,
                 most=most,
+                is_over=is_over,
             )
         except NoFeasibleDuration as error:
             if error.at_end:
@@ -219,6 +243,12 @@ class DurationRules:
                     f'beyond the limit {error.use.limit:.6g} N m'
                 )
                 raise self._rejection(error.use, why) from error
+            if is_over is not None and is_over():
+                raise RequestRejected(
+                    Reason.BUSY,
+                    f'no duration within the limits was found in the time until the start: with '
+                    f'{error.duration:.4g} s, {self._sentence(error.use)}',
+                ) from error
             why = '' if exceeded is None else f'{self._sentence(exceeded)}; '
             why += (
                 f'no duration from {shortest:g} to {self.longest:g} s obeys the limits: with the '

@@ -63,11 +63,16 @@ class Trial:
         return self.ratio <= 1.0 and not self.is_sampled
 
     @property
+    def starts_in_motion(self) -> bool:
+        """Tell whether the motion starts in motion."""
+        return self.plan is not None and self.plan.request.start_jets is not None
+
+    @property
     def is_hopeless(self) -> bool:
         """Tell whether nothing faster will obey: from rest it moves as far in less time."""
         if self.plan is None or self.worst is None or self.worst.quantity is Quantity.POSITION:
             return False
-        return self.plan.request.start_jets is None and self.ratio > HOPELESS
+        return not self.starts_in_motion and self.ratio > HOPELESS
 
 
 def duration_of(trial: Trial) -> float:

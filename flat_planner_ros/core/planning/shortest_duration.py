@@ -38,6 +38,9 @@ from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 import numpy as np
 
+IsOver = Callable[[], bool]
+"""Tells whether a search is to be content with what it has found."""
+
 DURATION_TOLERANCE = 2e-4
 """Distance of the answer to a shorter duration that breaks a limit, relative to it [-]."""
 
@@ -52,6 +55,9 @@ AIM = 1.01
 
 FIRST_STRIDE = 1.1
 """Least ratio of a duration to the one tried before, if that was too short [-]."""
+
+LEAP = 2.0
+"""Most that the next duration is of the last, from a start in motion: longer may be worse [-]."""
 
 DIGITS = 9
 """Significant digits of the durations tried: as many as are reported."""
@@ -113,6 +119,7 @@ def shortest_plan(
     bound: float | None = None,
     first: float | None = None,
     most: int | None = None,
+    is_over: IsOver | None = None,
 ) -> Plan:
     """
     Return the plan of the shortest duration that obeys the limits.
@@ -132,6 +139,9 @@ def shortest_plan(
     most
         Durations after which the search is content with what it has found; None for all that the
         answer needs.
+    is_over
+        Tells when to be content with it, asked before each duration; None for never. As long as
+        nothing obeys, longer ones are tried nevertheless.
 
     Returns
     -------
@@ -155,9 +165,9 @@ def shortest_plan(
     enough = inf if most is None else most
     if bound is None or not shortest < bound < longest:
         start = sqrt(shortest * longest) if first is None else first
-        return _Search(plan_of, limits, shortest, longest, enough, start).run()
+        return _Search(plan_of, limits, shortest, longest, enough, is_over, start).run()
     least = float(f'{bound:.{DIGITS}g}')
-    return _Search(plan_of, limits, least, longest, enough, least, is_bound=True).run()
+    return _Search(plan_of, limits, least, longest, enough, is_over, least, is_bound=True).run()
 
 
 @dataclass(eq=False)
@@ -169,6 +179,7 @@ class _Search:
     shortest: float
     longest: float
     most: float
+    is_over: IsOver | None
     first: float
     is_bound: bool = False
     trials: dict[float, Trial] = field(default_factory=dict)
@@ -184,7 +195,7 @@ class _Search:
                 return trial.plan
         self._bracket(self.first)
         self._refine()
-        if not self._is_confirmed():
+        while not self._is_confirmed() and max(self.trials) < self.longest:
             # What seemed to obey by samples does not: more often than not, a little more will.
             self._bracket(max(self.trials))
             self._refine()
@@ -201,7 +212,7 @@ class _Search:
     @property
     def _is_content(self) -> bool:
         """Tell whether enough durations have been tried."""
-        return len(self.trials) >= self.most
+        return len(self.trials) >= self.most or (self.is_over is not None and self.is_over())
 
     @property
     def _lowest(self) -> Trial:
@@ -270,9 +281,10 @@ class _Search:
             if descends:
                 beyond = max(self.shortest, min(trial.estimate / AIM, here / stride))
             else:
-                beyond = min(self.longest, max(trial.estimate * AIM, here * stride))
+                leap = here * LEAP if trial.starts_in_motion else inf
+                beyond = min(self.longest, max(trial.estimate * AIM, here * stride), leap)
             stride *= stride
-            if beyond == here or self._is_content:
+            if beyond == here or (descends and self._is_content):
                 return
             trial = self._glance(beyond)
 

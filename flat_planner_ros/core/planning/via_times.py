@@ -29,6 +29,7 @@ from flat_planner_ros.core.motion_law import PathConditions, PathCost, Quadratic
 from flat_planner_ros.core.planning.motion_problem import problem_of
 from flat_planner_ros.core.planning.planner import path_of
 from flat_planner_ros.core.planning.request import MotionRequest, PlanningOptions, ViaPoint
+from flat_planner_ros.core.planning.shortest_duration import IsOver
 import numpy as np
 
 LEAST_SHARE = 0.05
@@ -67,7 +68,12 @@ FLATTEST = 1e-6
 
 
 def with_via_times(
-    request: MotionRequest, arm: PlanarArm, options: PlanningOptions, *, is_near: bool = False
+    request: MotionRequest,
+    arm: PlanarArm,
+    options: PlanningOptions,
+    *,
+    is_near: bool = False,
+    is_over: IsOver | None = None,
 ) -> MotionRequest:
     """
     Return a request whose via points have the times at which the motion is cheapest.
@@ -81,6 +87,8 @@ def with_via_times(
         As for `plan`.
     is_near
         Whether the times are those of another duration in proportion: the search goes on there.
+    is_over
+        Tells when to be content with the best so far, asked before each step; None for never.
 
     Raises
     ------
@@ -90,7 +98,8 @@ def with_via_times(
     """
     try:
         problem = problem_of(arm, options, request.duration)
-        edges = cheapest_edges(problem.cost, path_of(request, problem), is_near=is_near)
+        path = path_of(request, problem)
+        edges = cheapest_edges(problem.cost, path, is_near=is_near, is_over=is_over)
     except ArithmeticError as error:
         raise UncertifiedPlan('boundary residual', inf, 0.0) from error
     via = tuple(
@@ -101,7 +110,11 @@ def with_via_times(
 
 
 def cheapest_edges(
-    cost: QuadraticCost, path: PathConditions, *, is_near: bool = False
+    cost: QuadraticCost,
+    path: PathConditions,
+    *,
+    is_near: bool = False,
+    is_over: IsOver | None = None,
 ) -> FloatArray:
     """
     Return edges of a path's segments that make it cheap: no small change of them is cheaper.
@@ -114,6 +127,8 @@ def cheapest_edges(
         What is passed; of its edges, the last one alone matters, unless they are near.
     is_near
         Whether the search starts from these edges.
+    is_over
+        As for `with_via_times`.
 
     Returns
     -------
@@ -130,17 +145,21 @@ def cheapest_edges(
     if is_near:
         parts = np.diff(path.edges) / path.edges[-1] - LEAST_SHARE / count
         guess = np.log(np.maximum(parts, np.finfo(float).eps))
-        return _minimum(cost, path, guess, GAIN_TOLERANCE).edges
+        return _minimum(cost, path, guess, GAIN_TOLERANCE, is_over).edges
     guess = GUESS_POWER * np.log(np.maximum(distances / distances.max(), LEAST_SHARE**2))
     guess[[0, -1]] += log(GUESS_AT_ENDS)
     plain = QuadraticCost(matrix=np.diag([0.0] * (len(cost.matrix) - 1) + [1.0]))
     if (cost.matrix != plain.matrix).any():
-        guess = _minimum(plain, path, guess, GUESS_TOLERANCE).logarithms
-    return _minimum(cost, path, guess, GAIN_TOLERANCE).edges
+        guess = _minimum(plain, path, guess, GUESS_TOLERANCE, is_over).logarithms
+    return _minimum(cost, path, guess, GAIN_TOLERANCE, is_over).edges
 
 
 def _minimum(
-    cost: QuadraticCost, path: PathConditions, guess: FloatArray, tolerance: float
+    cost: QuadraticCost,
+    path: PathConditions,
+    guess: FloatArray,
+    tolerance: float,
+    is_over: IsOver | None,
 ) -> '_Division':
     """
     Return the cheapest division of a path near a guess, by Newton's method.
@@ -154,6 +173,8 @@ def _minimum(
     reach = FIRST_REACH
     for _ in range(MAX_STEPS):
         if np.abs(here.gradient).max() <= GRADIENT_TOLERANCE:
+            break
+        if is_over is not None and is_over():
             break
         bends, directions = np.linalg.eigh(here.curvatures())
         sizes = np.maximum(np.abs(bends), FLATTEST * np.abs(bends).max())

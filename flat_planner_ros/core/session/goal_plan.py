@@ -28,6 +28,7 @@ from flat_planner_ros.core.arm import (
 )
 from flat_planner_ros.core.planning import (
     DurationRules,
+    IsOver,
     LimitUse,
     MotionRequest,
     Plan,
@@ -40,6 +41,7 @@ from flat_planner_ros.core.planning import (
     ViaPoint,
     with_via_times,
 )
+from flat_planner_ros.core.session.allowance import Allowance
 from flat_planner_ros.core.session.caught_start import patience, swing_time
 from flat_planner_ros.core.session.goal import Goal
 from flat_planner_ros.core.session.motion_start import MotionStart
@@ -53,14 +55,22 @@ NOMINAL_DURATION = 1.0
 ROUGH_TRIALS = 8
 """Durations that are tried for one that tells the shares of via points."""
 
+TIMES_SHARE = 0.4
+"""Part of the time for planning in motion after which times of via points are kept [-]."""
+
 SETTLING_TRIALS = 50
 """Durations that are tried at most until a motion to rest is sent: it is urgent."""
 
 
 def plan_of_goal(
-    settings: SessionSettings, start: MotionStart, goal: Goal, duration: float | None
+    settings: SessionSettings,
+    start: MotionStart,
+    goal: Goal,
+    duration: float | None,
+    allowance: Allowance | None = None,
 ) -> tuple[Plan, LimitUse | None]:
     """Return the plan of a checked goal within the limits, and what made it longer than asked."""
+    is_over = None if allowance is None else allowance.over_at(1.0)
     arm, options = _model(settings, start)
     rules = settings.duration_rules(start.pose)
     rules.check_pose('the start', start.pose)
@@ -69,30 +79,49 @@ def plan_of_goal(
         rules.check_pose(f'via point {index}', positions)
     rules.check_pose('the final', final)
     is_prescribed = duration is not None
+    # From a start in motion, much longer motions swing far out: no place for a search to start.
+    first = None if start.running is None else start.running.plan.duration
     with _refusals(settings, start):
         request = _request(goal, start, duration or NOMINAL_DURATION)
         if not via or goal.duration is not None:
-            return rules.plan_within(request, arm, options, is_prescribed=is_prescribed)
-        request = with_via_times(request, arm, options)
+            return rules.plan_within(
+                request, arm, options, is_prescribed=is_prescribed, first=first, is_over=is_over
+            )
+        enough = None if allowance is None else allowance.over_at(TIMES_SHARE)
+        request = with_via_times(request, arm, options, is_over=enough)
         if is_prescribed:
-            return rules.plan_within(request, arm, options, is_prescribed=True)
+            return rules.plan_within(request, arm, options, is_prescribed=True, is_over=is_over)
         # The best shares of the time depend on the time, if little: first it is found roughly.
-        rough = _rough_plan(rules, request, arm, options)
+        rough = _rough_plan(rules, request, arm, options, first, is_over)
+        if is_over is not None and is_over():
+            return rough, None
         gentle = rough.request.stretched(min(rules.factor * rough.duration, rules.longest))
-        request = with_via_times(gentle, arm, options, is_near=True)
-        return rules.plan_within(request, arm, options, is_prescribed=False, first=rough.duration)
+        request = with_via_times(gentle, arm, options, is_near=True, is_over=is_over)
+        return rules.plan_within(
+            request, arm, options, is_prescribed=False, first=rough.duration, is_over=is_over
+        )
 
 
 def _rough_plan(
-    rules: DurationRules, request: MotionRequest, arm: PlanarArm, options: PlanningOptions
+    rules: DurationRules,
+    request: MotionRequest,
+    arm: PlanarArm,
+    options: PlanningOptions,
+    first: float | None,
+    is_over: IsOver | None,
 ) -> Plan:
     """Return a plan of nearly the shortest duration, by few trials if they find one."""
     try:
         return rules.shortest_of(
-            lambda time: plan(request.stretched(time), arm, options), most=ROUGH_TRIALS
+            lambda time: plan(request.stretched(time), arm, options),
+            most=ROUGH_TRIALS,
+            first=first,
+            is_over=is_over,
         )
     except RequestRejected:
-        return rules.plan_within(request, arm, options, is_prescribed=False)[0]
+        return rules.plan_within(
+            request, arm, options, is_prescribed=False, first=first, is_over=is_over
+        )[0]
 
 
 def settling_plan(settings: SessionSettings, start: MotionStart, last: FloatArray | None) -> Plan:

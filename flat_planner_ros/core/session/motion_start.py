@@ -69,6 +69,11 @@ class MotionStart(NamedTuple):
     running: Motion | None = None
     swing: Swing | None = None
 
+    @property
+    def may_wait(self) -> bool:
+        """Tell whether the motion may as well start later: the arm rests until then."""
+        return self.running is None and self.jets is None
+
 
 def motion_start(
     settings: SessionSettings,

@@ -19,6 +19,7 @@ from math import pi
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.planning import OWN_LAWS, Plan, PlanSamples
+from flat_planner_ros.core.session.allowance import Allowance
 from flat_planner_ros.core.session.goal import Goal
 from flat_planner_ros.core.session.motion_start import MotionStart
 from flat_planner_ros.core.session.settings import SessionSettings
@@ -121,3 +122,24 @@ def turns_remarks(settings: SessionSettings, goal: Goal, pose: FloatArray) -> It
                 f'{name} is asked to make {turns[joint]:.3g} turns; angles are in radians, 90 '
                 f'degrees are 1.5708'
             )
+
+
+def hurry_remarks(settings: SessionSettings, allowance: Allowance | None) -> tuple[str, ...]:
+    """
+    Return what a plan lacks that had to be made before its start in motion.
+
+    Parameters
+    ----------
+    settings
+        With the lookahead.
+    allowance
+        Time that there was for planning, None if it was not limited.
+
+    """
+    if allowance is None or not allowance.was_needed:
+        return ()
+    return (
+        f'planned in haste, for a start in motion {settings.lookahead:g} s ahead '
+        f'(replan.lookahead): with more time its duration, or its times of via points, may be '
+        f'better',
+    )

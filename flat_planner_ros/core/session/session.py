@@ -14,7 +14,6 @@
 
 """Session of a planner: goals and measurements in, motions out, in the order of time."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 
@@ -25,6 +24,7 @@ from flat_planner_ros.core.planning import (
     Reason,
     RequestRejected,
 )
+from flat_planner_ros.core.session.allowance import allowance_for, Clock, DELIVERY_SHARE
 from flat_planner_ros.core.session.caught_start import is_moving
 from flat_planner_ros.core.session.delivery import Delivery
 from flat_planner_ros.core.session.execution import (
@@ -45,14 +45,14 @@ from flat_planner_ros.core.session.motion_start import (
     start_in_motion,
 )
 from flat_planner_ros.core.session.recent_states import RecentStates
-from flat_planner_ros.core.session.remarks import layer_remarks, remarks_on, turns_remarks
+from flat_planner_ros.core.session.remarks import (
+    hurry_remarks,
+    layer_remarks,
+    remarks_on,
+    turns_remarks,
+)
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
 from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
-
-Clock = Callable[[], float]
-
-DELIVERY_SHARE = 0.25
-"""Part of the lookahead that is left for a command to reach its executor [-]."""
 
 
 class PlannerSession:
@@ -200,20 +200,22 @@ class PlannerSession:
         start = self._start(goal.stamp, now)
         if start.running is not None:
             check_carried_out(settings, self._timeline, self._recent.last, now)
+        allowance = allowance_for(start, now, clock, settings.lookahead)
         try:
-            found, exceeded = plan_of_goal(settings, start, asked, duration)
+            found, exceeded = plan_of_goal(settings, start, asked, duration, allowance)
         except RequestRejected as error:
             turns = turns_remarks(settings, asked, start.pose)
             raise replace(error, message='; '.join([error.message, *turns])) from error
         is_gentle = duration is None and settings.duration_factor > 1.0
         motion = self._motion_of(found, start, now)
         layers = layer_remarks(settings, found, motion.samples)
+        hurry = hurry_remarks(settings, allowance)
         motion = replace(
             motion,
-            is_shortest=found.duration != duration and not is_gentle,
+            is_shortest=found.duration != duration and not (is_gentle or hurry),
             duration_factor=settings.duration_factor if is_gentle else 1.0,
             exceeded=exceeded,
-            remarks=(*remarks_on(settings, asked, start, now), *layers),
+            remarks=(*remarks_on(settings, asked, start, now), *layers, *hurry),
         )
         motion = self._accepted(motion, start, goal.stamp, clock)
         self._last_goal = replace(goal.without_start, stamp=None)
@@ -342,7 +344,7 @@ class PlannerSession:
         """Return a motion with its place in time, which it takes unless planning took too long."""
         settings = self._applied
         now = motion.planned_at if clock is None else clock()
-        if start.running is None and start.jets is None:
+        if start.may_wait:
             check_stamp(stamp, now)
             if stamp is None:
                 motion = replace(motion, start=now + settings.start_delay)

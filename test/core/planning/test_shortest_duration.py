@@ -334,3 +334,37 @@ def test_where_a_search_starts_does_not_matter(paper_arm, strategy, first):
     expected = shortest_plan(plans, limits, **RANGE)
     assert found.duration == pytest.approx(expected.duration, rel=DURATION_TOLERANCE)
     assert uses_of(found, limits) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize('strategy', RATIOS)
+def test_a_search_from_just_below_the_answer_tries_little_more(paper_arm, strategy):
+    # By samples, the first duration seems to obey.
+    plans = motions(paper_arm, np.array([pi, 0.0]), strategy=strategy)
+    limits = JointLimits.of(2, effort=[TORQUE, np.inf])
+    expected = shortest_plan(plans, limits, **RANGE).duration
+    tried = []
+
+    def counted(duration):
+        tried.append(duration)
+        return plans(duration)
+
+    found = shortest_plan(counted, limits, **RANGE, first=expected * (1.0 - 1e-4))
+    assert found.duration == pytest.approx(expected, rel=DURATION_TOLERANCE)
+    assert len(tried) < 20
+
+
+def test_a_search_that_is_over_tries_longer_ones_until_one_obeys(paper_arm):
+    plans = motions(paper_arm, np.array([pi, 0.0]))
+    limits = JointLimits.of(2, effort=[TORQUE, np.inf])
+    tried = []
+
+    def counted(duration):
+        tried.append(duration)
+        return plans(duration)
+
+    found = shortest_plan(counted, limits, **RANGE, first=0.1, is_over=lambda: True)
+    assert uses_of(found, limits) <= 1.0 + 1e-9
+    assert found.duration == max(tried)
+    assert len(tried) < 10
+    still = shortest_plan(counted, limits, **RANGE, first=5.0, is_over=lambda: True)
+    assert still.duration == 5.0
