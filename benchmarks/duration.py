@@ -177,7 +177,8 @@ def _search(
     try:
         request = MotionRequest(start=case.start, final=final, duration=1.0)
         bound = shortest_known(request, case.arm, options, float(case.limits.effort[-2]))
-        found = shortest_plan(counted, case.limits, **RANGE, bound=bound)
+        first = case.limits.likely_duration(final - case.start) or None
+        found = shortest_plan(counted, case.limits, **RANGE, bound=bound, first=first)
         assert case.feasible
     except NoFeasibleDuration:
         assert not case.feasible

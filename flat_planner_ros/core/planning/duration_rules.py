@@ -154,8 +154,9 @@ class DurationRules:
         limit = float(self.limits.effort[-2])
         if not is_prescribed:
             bound = shortest_known(request, arm, options, limit)
+            likely = first or self._likely(request)
             found = self._shortest(
-                plan_of, self.shortest, bound=bound, first=first, is_over=is_over
+                plan_of, self.shortest, bound=bound, first=likely, is_over=is_over
             )
             return self._gentle(plan_of, found), None
         prescribed = plan(request, arm, options)
@@ -211,6 +212,12 @@ class DurationRules:
         slower = plan_of(duration)
         use = self.limits.worst(slower)
         return shortest if use is not None and use.is_exceeded else slower
+
+    def _likely(self, request: MotionRequest) -> float | None:
+        """Return where the search for the shortest duration may start [s], None if unknown."""
+        if request.start_jets is not None:
+            return None
+        return self.limits.likely_duration(request.final - request.start) or None
 
     def _shortest(
         self,

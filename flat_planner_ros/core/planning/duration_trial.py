@@ -15,14 +15,17 @@
 """Trials of a search for the shortest duration: what is known of a duration that was tried."""
 
 from dataclasses import dataclass
-from math import inf, log
+from math import exp, inf, log
 
 from flat_planner_ros.core.planning.certified_plan import Plan
 from flat_planner_ros.core.planning.extrema import Quantity
-from flat_planner_ros.core.planning.limits import LimitUse
+from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 
 HOPELESS = 100.0
 """Use of a limit of velocity or effort beyond which no shorter duration is tried [-]."""
+
+LOG_MAX = 700.0
+"""Logarithm of a duration that is still in double precision."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +77,13 @@ class Trial:
             return False
         return not self.starts_in_motion and self.ratio > HOPELESS
 
+    def least_duration(self, limits: JointLimits) -> float:
+        """Return the time below which the way from rest is too far for a joint's velocity [s]."""
+        if self.plan is None or self.starts_in_motion:
+            return 0.0
+        request = self.plan.request
+        return limits.least_duration(request.final - request.start)
+
 
 def duration_of(trial: Trial) -> float:
     """Return the duration of a trial [s]."""
@@ -87,3 +97,11 @@ def root_of(first: Trial, second: Trial) -> float:
         return inf
     start = log(first.duration)
     return start - log(first.ratio) / rise * (log(second.duration) - start)
+
+
+def line_root(first: Trial, second: Trial) -> float:
+    """Return the same as a duration, that of the second trial where there is no line [s]."""
+    if first is second or not 0.0 < first.ratio * second.ratio < inf:
+        return second.duration
+    root = root_of(first, second)
+    return exp(root) if root < LOG_MAX else inf

@@ -27,6 +27,9 @@ import numpy as np
 ROUNDING = 1e-9
 """Excess that counts as rounding, relative to the limit; for positions also to 1 rad [-]."""
 
+PEAK_OVER_MEAN = 693.0 / 256.0
+"""Peak velocity of the polynomial law from rest to rest over its mean one [-]."""
+
 FIELDS = ('position_min', 'position_max', 'velocity', 'effort')
 """Limits of a joint."""
 
@@ -171,6 +174,22 @@ class JointLimits:
             Quantity.EFFORT: np.isfinite(self.effort),
         }
         return tuple(quantity for quantity, joints in finite.items() if joints.any())
+
+    def least_duration(self, way: FloatArray) -> float:
+        """
+        Return the time below which a joint would have to be faster than it may [s].
+
+        Parameters
+        ----------
+        way
+            How far the joints go, shape (n,) [rad].
+
+        """
+        return float((np.abs(way) / self.velocity).max())
+
+    def likely_duration(self, way: FloatArray) -> float:
+        """Return the time in which the polynomial law just obeys the velocities [s]."""
+        return PEAK_OVER_MEAN * self.least_duration(way)
 
     @property
     def bounds_duration(self) -> bool:

@@ -33,7 +33,7 @@ from flat_planner_ros.core.arm import (
     UncertifiedPlan,
 )
 from flat_planner_ros.core.planning.certified_plan import Plan
-from flat_planner_ros.core.planning.duration_trial import duration_of, root_of, Trial
+from flat_planner_ros.core.planning.duration_trial import duration_of, line_root, root_of, Trial
 from flat_planner_ros.core.planning.extrema import Quantity
 from flat_planner_ros.core.planning.limits import JointLimits, LimitUse
 import numpy as np
@@ -56,17 +56,23 @@ AIM = 1.01
 FIRST_STRIDE = 1.1
 """Least ratio of a duration to the one tried before, if that was too short [-]."""
 
+LONG_STRIDE = 10.0
+"""The same from which a line through two trials does not hold it back, which could creep [-]."""
+
 LEAP = 2.0
 """Most that the next duration is of the last, from a start in motion: longer may be worse [-]."""
 
 DIGITS = 9
 """Significant digits of the durations tried: as many as are reported."""
 
-PATIENCE = 2
+PATIENCE = 3
 """Secants in a row that do not halve a gap, after which a bisection does [-]."""
 
 NARROW = 1.05
 """Ratio of two durations between which trials are looked at in full [-]."""
+
+SHARP = 1.01
+"""Ratio of two durations up to which the peaks of one are at the times of the other's [-]."""
 
 ALIKE = 1.02
 """Ratio of two uses of a limit, both beyond it, between which others are taken to be [-]."""
@@ -164,7 +170,7 @@ def shortest_plan(
         raise InvalidRequest(f'no range of durations: {shortest:g} to {longest:g} s')
     enough = inf if most is None else most
     if bound is None or not shortest < bound < longest:
-        start = sqrt(shortest * longest) if first is None else first
+        start = sqrt(shortest * longest) if first is None else min(max(first, shortest), longest)
         return _Search(plan_of, limits, shortest, longest, enough, is_over, start).run()
     least = float(f'{bound:.{DIGITS}g}')
     return _Search(plan_of, limits, least, longest, enough, is_over, least, is_bound=True).run()
@@ -269,24 +275,28 @@ class _Search:
 
     def _is_near_peaks(self, duration: float) -> bool:
         """Tell whether the peaks of nearly the same duration are known."""
-        return 1.0 / NARROW < duration / self.peaks_of < NARROW
+        return 1.0 / SHARP < duration / self.peaks_of < SHARP
 
     def _bracket(self, first: float) -> None:
         """Look, by samples, for one duration that seems to obey above one that does not."""
         stride = FIRST_STRIDE
-        trial = self._glance(first)
+        before = trial = self._glance(first)
         descends = trial.ratio <= 1.0
         while (trial.ratio <= 1.0) == descends:
             here = trial.duration
+            root = line_root(before, trial) if stride < LONG_STRIDE else here
+            # As far as powers say, or a stride, but not beyond a line through the last two trials.
             if descends:
-                beyond = max(self.shortest, min(trial.estimate / AIM, here / stride))
+                line = root / AIM if root < here else 0.0
+                beyond = max(self.shortest, min(trial.estimate / AIM, here / stride), line)
             else:
+                line = root * AIM if root > here else inf
                 leap = here * LEAP if trial.starts_in_motion else inf
-                beyond = min(self.longest, max(trial.estimate * AIM, here * stride), leap)
+                beyond = min(self.longest, max(trial.estimate * AIM, here * stride), leap, line)
             stride *= stride
             if beyond == here or (descends and self._is_content):
                 return
-            trial = self._glance(beyond)
+            before, trial = trial, self._glance(beyond)
 
     @property
     def _seeming(self) -> list[Trial]:
@@ -311,7 +321,7 @@ class _Search:
             bad = max(below, key=duration_of, default=None)
             width = inf if bad is None else good.duration / bad.duration
             is_last = width <= 1.0 + DURATION_TOLERANCE or good.duration == self.shortest
-            if good.is_sampled and (is_last or width <= NARROW):
+            if good.is_sampled and (is_last or (width <= NARROW and not good.is_sharp)):
                 self._try(good.duration)
                 continue
             if is_last:
@@ -337,18 +347,24 @@ class _Search:
         known = [t for t in self.trials.values() if 0.0 < t.ratio < inf]
         sharp = [t for t in known if t.is_sharp] or known
         sharp.sort(key=lambda trial: abs(log(trial.ratio)))
-        # Through the two trials nearest to the limit, though they may be on one side of it.
-        root = log(bad.estimate) if len(sharp) < 2 else root_of(sharp[0], sharp[1])
+        if len(sharp) < 2:
+            root = log(sharp[0].estimate)  # so near that powers lead from it to the limit
+        elif abs(log(sharp[1].ratio)) > log(NARROW):
+            root = root_of(bad, good)
+        else:
+            # Through the two nearest to the limit, though they may be on one side of it.
+            root = root_of(sharp[0], sharp[1])
         return exp(root if low < root < high else root_of(bad, good))
 
     def _scan(self, low: float, high: float) -> None:
         """Try a grid of durations between two."""
         duration = high / SCAN_STEP
-        while duration > low and not self._is_content:
+        lowest = max([low, *(trial.least_duration(self.limits) for trial in self.trials.values())])
+        while duration > lowest and not self._is_content:
             if not self._is_ruled_out(duration) and self._try_briefly(duration).is_hopeless:
                 return
             duration /= SCAN_STEP
-        if not self._is_content:
+        if low == lowest and not self._is_content:
             self._try_briefly(low)
 
     def _is_ruled_out(self, duration: float) -> bool:

@@ -28,6 +28,8 @@ from flat_planner_ros.core.planning.request import MotionRequest, PlanningOption
 from flat_planner_ros.core.planning.shortest_duration import (
     DURATION_TOLERANCE,
     NoFeasibleDuration,
+    SCAN_DEPTH,
+    SCAN_STEP,
     shortest_plan,
 )
 import numpy as np
@@ -187,6 +189,26 @@ def test_velocity_alone_gives_the_time_of_the_polynomials_peak():
     found = shortest_plan(motions(stiff, [pi, 0.0], strategy=Strategy.POLYNOMIAL), limits, **RANGE)
     assert found.duration == pytest.approx(693 / 256 * pi / 6.0, rel=2 * DURATION_TOLERANCE)
     assert found.duration >= 693 / 256 * pi / 6.0 * (1.0 - 1e-6)
+    likely = limits.likely_duration(np.array([pi, 0.0]))
+    assert likely == pytest.approx(found.duration, rel=2 * DURATION_TOLERANCE)
+
+
+def test_no_time_is_tried_in_which_a_joint_would_be_too_fast_on_average():
+    tried = []
+    start, final = np.array([-0.9, 0.0, 0.0, 0.0]), np.array([0.9, 0.5, -0.3, 0.0])
+    motion = motions(arm_of(4, gravity=9.81), final, start)
+
+    def noted(duration):
+        tried.append(duration)
+        return motion(duration)
+
+    limits = JointLimits.of(4, effort=[25.0, 12.0, 0.5, inf], velocity=[3.0] * 4)
+    found = shortest_plan(noted, limits, **RANGE)
+    # Else it would have been scanned down to 1 / SCAN_DEPTH of the answer.
+    assert found.duration < SCAN_DEPTH * 0.6
+    assert limits.least_duration(final - start) == pytest.approx(0.6)
+    assert 0.6 <= min(tried) < 0.6 * SCAN_STEP
+    assert uses_of(motion(0.6), limits) > 1.0
 
 
 def test_a_position_limit_may_ask_for_more_time(paper_arm):
