@@ -80,17 +80,20 @@ class PlanSamples:
     @property
     def positions(self) -> FloatArray:
         """Angles of all joints, shape (m, n) [rad]."""
-        return self._joints[0]
+        positions: FloatArray = self.joint_motion[0]
+        return positions
 
     @property
     def velocities(self) -> FloatArray:
         """First derivatives of the positions, shape (m, n) [rad/s]."""
-        return self._joints[1]
+        velocities: FloatArray = self.joint_motion[1]
+        return velocities
 
     @property
     def accelerations(self) -> FloatArray:
         """Second derivatives of the positions, shape (m, n) [rad/s^2]."""
-        return self._joints[2]
+        accelerations: FloatArray = self.joint_motion[2]
+        return accelerations
 
     @property
     def driving_velocity(self) -> FloatArray:
@@ -110,7 +113,7 @@ class PlanSamples:
         efforts = np.zeros((len(self.times), n))
         efforts[:, n - 2] = self.driving_effort
         if n > 2:
-            efforts[:, : n - 2] = self.problem.arm.rigid_effort(*self._joints)[:, : n - 2]
+            efforts[:, : n - 2] = self.problem.arm.rigid_effort(*self.joint_motion)[:, : n - 2]
         if self.compensates_friction:
             efforts[:, :-1] += self.problem.arm.friction(self.velocities)
         return locked(efforts)
@@ -124,20 +127,19 @@ class PlanSamples:
         return locked(flat)
 
     @cached_property
-    def _joints(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return positions, velocities and accelerations."""
-        n = self.problem.arm.n
-        passive = _derivatives(self.problem.flat_map.deflection, self.planned[0], JOINT_ORDERS)
-        joints = np.empty((JOINT_ORDERS, len(self.times), n))
+    def joint_motion(self) -> FloatArray:
+        """Positions, velocities and accelerations of all joints, shape (3, m, n) [rad/s^k]."""
+        n, flat_map = self.problem.arm.n, self.problem.flat_map
+        passive = _derivatives(flat_map.deflection, self.planned[0], JOINT_ORDERS)
         # y1 is the angle of the last link, the sum of all joints'.
-        inner = np.subtract(self.flat[0, :JOINT_ORDERS], passive, out=joints[:, :, n - 2])
+        whole = _derivatives(flat_map.output, self.planned[0], JOINT_ORDERS)
+        joints = np.empty((JOINT_ORDERS, len(self.times), n))
+        inner = np.subtract(whole, passive, out=joints[:, :, n - 2])
         for i in range(n - 2):
             joints[:, :, i] = self.planned[1 + i, :JOINT_ORDERS]
             inner -= joints[:, :, i]
         joints[:, :, n - 1] = passive
-        locked(joints)
-        positions, velocities, accelerations = joints
-        return positions, velocities, accelerations
+        return locked(joints)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -244,7 +244,8 @@ class LawTrajectory:
         ends = np.zeros_like(self.start)
         ends[:, 0] = self.final
         for reached, end in ((clipped <= 0.0, self.start), (clipped >= duration, ends)):
-            planned[:, :CONDITIONS, reached] = end[..., None]
+            if reached.any():
+                planned[:, :CONDITIONS, reached] = end[..., None]
         return planned
 
     def on_even_grid(self, intervals: int) -> tuple[FloatArray, FloatArray]:

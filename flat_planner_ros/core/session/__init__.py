@@ -26,7 +26,7 @@ from flat_planner_ros.core.session.settings import (
     WhenMoving,
 )
 from flat_planner_ros.core.session.single_goal import single_goal
-from flat_planner_ros.core.session.timeline import Motion, Timeline, Track
+from flat_planner_ros.core.session.timeline import Motion, Piece, Timeline, Track
 
 __all__ = [
     'Astray',
@@ -39,6 +39,7 @@ __all__ = [
     'Motion',
     'Outcome',
     'path_goal',
+    'Piece',
     'PlannerSession',
     'ReplanFrom',
     'SessionSettings',

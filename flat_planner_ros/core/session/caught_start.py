@@ -14,7 +14,7 @@
 
 """Start of a motion that catches an arm in motion, from what is measured."""
 
-from math import log, tau
+from math import isfinite, log, tau
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, NaturalMode
@@ -135,15 +135,14 @@ def is_moving(settings: SessionSettings, timeline: Timeline, recent: RecentState
     measured = recent.last
     if measured is None:
         return False
-    velocities = measured.velocities
-    if velocities is None or not np.isfinite(velocities).all():
+    speeds = [] if measured.velocities is None else measured.velocities.tolist()
+    if not speeds or not all(map(isfinite, speeds)):
         inputs = Inputs(settings.arm, settings.options.drive, timeline.known)
         found = recent.estimate(settings.arm, inputs, measured.time)
-        velocities = np.zeros(settings.arm.n) if found is None else found.velocities
-    return bool(
-        abs(measured.positions[-1]) > settings.position_tolerance
-        or (np.abs(velocities) > settings.velocity_tolerance).any()
-    )
+        speeds = [] if found is None else found.velocities.tolist()
+    limit = settings.velocity_tolerance
+    is_off = abs(float(measured.positions[-1])) > settings.position_tolerance
+    return is_off or any(abs(speed) > limit for speed in speeds)
 
 
 def is_driven(settings: SessionSettings, measured: JointSample) -> bool:

@@ -16,9 +16,9 @@
 
 from collections import deque
 from dataclasses import replace
+from statistics import median
 
 from flat_planner_ros.core.session.settings import SessionSettings
-import numpy as np
 
 AGES = 200
 """Joint states whose age on arrival is remembered."""
@@ -49,7 +49,7 @@ class Delivery:
     @property
     def delay(self) -> float:
         """Return the usual time on the way [s]."""
-        return abs(float(np.median(self._ages))) if self._ages else 0.0
+        return abs(median(self._ages)) if self._ages else 0.0
 
     @property
     def start_delay(self) -> float:

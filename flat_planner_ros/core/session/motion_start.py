@@ -14,6 +14,7 @@
 
 """Start of a motion: at rest, or in the midst of another motion, spliced to it without a step."""
 
+from math import nan
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, JointSample
@@ -193,7 +194,8 @@ def _pose_at_rest(
     timeout = settings.joint_state_timeout
     if settings.start_source in (StartSource.AUTO, StartSource.MEASURED):
         measured = _fresh(measured, timeout, now, lack)
-        pose = np.append(measured.positions[:-1], 0.0)
+        pose = measured.positions.copy()
+        pose[-1] = 0.0
     else:
         if settings.start_source is StartSource.PARAMETER:
             pose = np.array(settings.start_position)
@@ -316,10 +318,10 @@ def _fresh(measured: JointSample | None, limit: float, now: float, lack: str) ->
 
 def _check_at_rest(settings: SessionSettings, measured: JointSample, planned: FloatArray) -> None:
     """Refuse to start from another place, or while the arm still moves."""
-    nothing = np.full(len(planned), np.nan)
-    velocities = nothing if measured.velocities is None else measured.velocities
+    known = measured.velocities
+    velocities = [nan] * len(planned) if known is None else known.tolist()
     for name, position, velocity, start in zip(
-        settings.joints, measured.positions, velocities, planned, strict=True
+        settings.joints, measured.positions.tolist(), velocities, planned.tolist(), strict=True
     ):
         # Written so that a NaN position is refused and a NaN velocity is not.
         if not abs(position - start) <= settings.position_tolerance:
@@ -328,7 +330,7 @@ def _check_at_rest(settings: SessionSettings, measured: JointSample, planned: Fl
                 f'{name} is measured at {position:.4g} rad, not at the start {start:.4g} rad '
                 f'(tolerance {settings.position_tolerance:g} rad)',
                 joint=name,
-                value=float(position),
+                value=position,
                 limit=settings.position_tolerance,
             )
         if abs(velocity) > settings.velocity_tolerance:
@@ -337,6 +339,6 @@ def _check_at_rest(settings: SessionSettings, measured: JointSample, planned: Fl
                 f'{name} moves at {velocity:.4g} rad/s, more than '
                 f'{settings.velocity_tolerance:g} rad/s',
                 joint=name,
-                value=float(velocity),
+                value=velocity,
                 limit=settings.velocity_tolerance,
             )

@@ -15,7 +15,8 @@
 """What looks like a mistake about a goal that breaks no rule: units, stamps, another start."""
 
 from collections.abc import Iterator
-from math import pi
+from itertools import pairwise
+from math import tau
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.planning import OWN_LAWS, Plan, PlanSamples
@@ -90,7 +91,7 @@ def layer_remarks(settings: SessionSettings, found: Plan, samples: PlanSamples) 
     if found.options.strategy in OWN_LAWS:
         return
     efforts = samples.efforts[:, -2]  # joint n-1 alone carries the weights' layers
-    step = float(np.abs(np.diff(efforts)).max(initial=0.0))
+    step = float(np.abs(efforts[1:] - efforts[:-1]).max(initial=0.0))
     peak = float(np.abs(efforts).max())
     if step > STEEP * peak:
         yield (
@@ -114,12 +115,13 @@ def turns_remarks(settings: SessionSettings, goal: Goal, pose: FloatArray) -> It
         Angles at the start of its motion, shape (n,) [rad].
 
     """
-    poses = np.array([pose, *(point.positions for point in goal.points)])
-    turns = np.abs(np.diff(poses, axis=0)).max(axis=0) / (2.0 * pi)
+    poses = [pose.tolist(), *(point.positions for point in goal.points)]
     for joint, name in enumerate(settings.joints[:-1]):
-        if turns[joint] > 1.0 + ROUNDING and not settings.has_position_limits(joint):
+        ways = [abs(after[joint] - before[joint]) for before, after in pairwise(poses)]
+        turns = max(ways) / tau
+        if turns > 1.0 + ROUNDING and not settings.has_position_limits(joint):
             yield (
-                f'{name} is asked to make {turns[joint]:.3g} turns; angles are in radians, 90 '
+                f'{name} is asked to make {turns:.3g} turns; angles are in radians, 90 '
                 f'degrees are 1.5708'
             )
 

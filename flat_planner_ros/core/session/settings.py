@@ -251,10 +251,12 @@ class SessionSettings:
             Pose that it starts from, shape (n,) [rad].
 
         """
-        limits = self.limits or _no_limits(self.arm.n)
+        limits = self.limits
+        if limits is not None:
+            limits = limits.reaching(start, self.position_tolerance)
         return DurationRules(
             joints=self.joints,
-            limits=limits.reaching(start, self.position_tolerance),
+            limits=limits or _no_limits(self.arm.n),
             on_violation=self.on_violation,
             # A motion shorter than the spacing of its samples would be none.
             shortest=max(self.min_duration, self.period),

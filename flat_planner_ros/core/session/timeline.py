@@ -23,6 +23,8 @@ splice (docs/derivation.md, section S).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.planning import LimitUse, Plan, PlanSamples, Strategy
@@ -30,9 +32,6 @@ import numpy as np
 
 SPLICE_TOLERANCE = 1e-6
 """Points of an old motion this close to the start of the next one give way to its first [s]."""
-
-TABLES = ('positions', 'velocities', 'accelerations', 'efforts')
-"""Joint motion and effort, one row for each point."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,6 +94,13 @@ class Motion:
         return self.plan.at(np.array([now - self.start]))
 
 
+class Piece(NamedTuple):
+    """Points of a motion: its samples, and which of them."""
+
+    samples: PlanSamples
+    chosen: slice
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Track:
     """
@@ -106,20 +112,47 @@ class Track:
         Absolute time of the first point [s].
     times
         Time of each point from the start, strictly increasing from 0, shape (m,) [s].
-    positions, velocities, accelerations, efforts
-        Motion and effort of all joints, shape (m, n) [rad, rad/s, rad/s^2, N m].
-    flat
-        Derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k].
+    pieces
+        Where the points come from, in the order of time.
 
     """
 
     start: float
     times: FloatArray
-    positions: FloatArray
-    velocities: FloatArray
-    accelerations: FloatArray
-    efforts: FloatArray
-    flat: FloatArray
+    pieces: tuple[Piece, ...]
+
+    @property
+    def positions(self) -> FloatArray:
+        """Angles of all joints, shape (m, n) [rad]."""
+        positions: FloatArray = self._joint_motion[0]
+        return positions
+
+    @property
+    def velocities(self) -> FloatArray:
+        """First derivatives of the positions, shape (m, n) [rad/s]."""
+        velocities: FloatArray = self._joint_motion[1]
+        return velocities
+
+    @property
+    def accelerations(self) -> FloatArray:
+        """Second derivatives of the positions, shape (m, n) [rad/s^2]."""
+        accelerations: FloatArray = self._joint_motion[2]
+        return accelerations
+
+    @cached_property
+    def efforts(self) -> FloatArray:
+        """Efforts of all joints, shape (m, n) [N m]."""
+        return _joined([samples.efforts[chosen] for samples, chosen in self.pieces], 0)
+
+    @cached_property
+    def flat(self) -> FloatArray:
+        """Return derivatives 0 to 5 of every flat output, shape (n - 1, 6, m) [rad/s^k]."""
+        return _joined([samples.flat[:, :, chosen] for samples, chosen in self.pieces], 2)
+
+    @cached_property
+    def _joint_motion(self) -> FloatArray:
+        """Return positions, velocities and accelerations, shape (3, m, n)."""
+        return _joined([samples.joint_motion[:, chosen] for samples, chosen in self.pieces], 1)
 
 
 class Timeline:
@@ -165,7 +198,7 @@ class Timeline:
             return time
         # A point that is sent anyway, so that the spacing of points stays what it is.
         times = motion.samples.times
-        index = int(np.searchsorted(times, time - motion.start))
+        index = int(times.searchsorted(time - motion.start))
         return motion.start + float(times[index])
 
     def after(self, now: float) -> 'Timeline':
@@ -200,24 +233,21 @@ class Timeline:
         """
         left = self.after(now).motions or self.motions[-1:]
         first = left[0]
-        begun = int(np.searchsorted(first.samples.times, now - first.start, side='right')) - 1
+        begun = int(first.samples.times.searchsorted(now - first.start, side='right')) - 1
         begun = max(begun, 0)
         # Later points stay on the old grid to the last bit: what is being played does not change.
         origin = float(first.samples.times[begun])
         start = first.start + origin
-        times, flat = [], []
-        tables: dict[str, list[FloatArray]] = {name: [] for name in TABLES}
+        times, pieces = [], []
         for motion, after in zip(left, [*left[1:], None], strict=True):
-            until = np.inf if after is None else after.start - SPLICE_TOLERANCE - motion.start
-            end = int(np.searchsorted(motion.samples.times, until))
-            chosen = slice(begun if motion is first else 0, end)
-            shift = -origin if motion is first else motion.start - start
-            times.append(motion.samples.times[chosen] + shift)
-            flat.append(motion.samples.flat[:, :, chosen])
-            for name, parts in tables.items():
-                parts.append(getattr(motion.samples, name)[chosen])
-        joined = {name: _joined(parts, 0) for name, parts in tables.items()}
-        return Track(start=start, times=_joined(times, 0), flat=_joined(flat, 2), **joined)
+            grid, is_first = motion.samples.times, motion is first
+            end = len(grid)
+            if after is not None:
+                end = int(grid.searchsorted(after.start - SPLICE_TOLERANCE - motion.start))
+            chosen = slice(begun if is_first else 0, end)
+            times.append(grid[chosen] + (-origin if is_first else motion.start - start))
+            pieces.append(Piece(motion.samples, chosen))
+        return Track(start=start, times=_joined(times, 0), pieces=tuple(pieces))
 
 
 def _joined(parts: Sequence[FloatArray], axis: int) -> FloatArray:

@@ -22,6 +22,7 @@ from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
 from flat_planner_ros.ros.wire.command_form import WHOLE
 from flat_planner_ros.ros.wire.message_types import message_class, UnknownType
+from std_msgs.msg import Float64MultiArray
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 
@@ -39,6 +40,11 @@ class CommandOutlet:
     action
         Name of the controller's action; empty for the topic.
 
+    Attributes
+    ----------
+    efforts
+        Publisher of the stream of efforts, which is another way to the arm.
+
     Raises
     ------
     UnknownType
@@ -54,6 +60,9 @@ class CommandOutlet:
         self._command = node.create_publisher(kind, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = node.create_publisher(kind, interfaces.PLAN, interfaces.LATCHED)
         self._flat_plan = node.create_publisher(kind, interfaces.FLAT_PLAN, interfaces.LATCHED)
+        self.efforts = node.create_publisher(
+            Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
+        )
 
     def publish(self, track: Track, settings: PlannerSettings) -> None:
         """Publish what is to be carried out, the command first: its start is near."""
@@ -87,8 +96,8 @@ class CommandOutlet:
             return ''
         if self._controller is not None:
             return self._controller.doubt
-        streams = [interfaces.EFFORT_COMMANDS] if settings.stream_effort else []
-        return self._audience.unheard(interfaces.COMMAND, *streams)
+        streams = [self.efforts] if settings.stream_effort else []
+        return self._audience.unheard(self._command, *streams)
 
 
 def _controller(node: GuardedNode, session: PlannerSession, action: str) -> ControllerClient:

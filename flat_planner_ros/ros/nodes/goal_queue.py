@@ -16,6 +16,7 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
+from time import monotonic
 
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.core.session import Goal, PlannerSession
@@ -60,12 +61,15 @@ class GoalQueue:
         self._answer = answer
         self._waiting: deque[tuple[Read, Tell, float]] = deque()
         # Steady: a simulated clock may be what goals wait for.
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK_PERIOD, self.answer_due, clock=self._steady)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(LOOK_PERIOD, self.answer_due, clock=steady)
 
     def put(self, read: Read, tell: Tell = tell_nobody) -> None:
         """Take a goal."""
-        self._waiting.append((read, tell, stamps.now(self._steady) + self._patience(read)))
+        if not self._waiting and self._session.knows_start(stamps.now(self._node.get_clock())):
+            self._answer(read, tell)
+            return
+        self._waiting.append((read, tell, monotonic() + self._patience(read)))
         self.answer_due()
 
     def answer_due(self) -> None:
@@ -82,7 +86,7 @@ class GoalQueue:
         """Tell whether the first goal, which may wait until a time [s], is to be handed on."""
         return (
             self._session.knows_start(stamps.now(self._node.get_clock()))
-            or stamps.now(self._steady) >= until
+            or monotonic() >= until
             or len(self._waiting) > interfaces.BURST.depth
         )
 

@@ -16,12 +16,12 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from time import monotonic
 from typing import NamedTuple
 
 from flat_planner_ros.ros.nodes.node_log import NodeLog
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 WATCH_PERIOD = 1.0
 """Time between two looks at the graph, and thus between two errors [s]."""
@@ -50,8 +50,8 @@ class Audience:
     """
     Whether anybody carries out what a node publishes.
 
-    Who listens is looked up when their number changes, else once in WATCH_PERIOD: it takes as long
-    as planning a motion.
+    Who listens is looked up when their number changes, and once in WATCH_PERIOD beside the goals:
+    it takes as long as planning a motion.
 
     Parameters
     ----------
@@ -62,30 +62,41 @@ class Audience:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._looks: dict[str, _Look] = {}
+        self._looks: dict[Publisher, _Look] = {}
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(WATCH_PERIOD, self._look_again, clock=clock)
 
-    def unheard(self, *topics: str) -> str:
-        """Return that nobody carries out what is published on topics, a clause, or nothing."""
-        if any(self._is_heard(topic) for topic in topics):
+    def unheard(self, *publishers: Publisher) -> str:
+        """Return that nobody carries out what publishers send, a clause, or nothing."""
+        if any(self._is_heard(publisher) for publisher in publishers):
             return ''
-        names = map(self._node.resolve_topic_name, topics)
-        return f'nobody listens to {" or ".join(names)}'
+        return f'nobody listens to {" or ".join(each.topic_name for each in publishers)}'
 
-    def _is_heard(self, topic: str) -> bool:
-        """Tell whether anybody carries out what is published on a topic."""
-        number, now = self._node.count_subscribers(topic), monotonic()
-        look = self._looks.get(topic)
-        if look is None or number != look.number or now - look.time > WATCH_PERIOD:
-            look = _Look(number, now, bool(listeners(self._node, topic)))
-            self._looks[topic] = look
+    def _is_heard(self, publisher: Publisher) -> bool:
+        """Tell whether anybody carries out what a publisher sends."""
+        number = publisher.get_subscription_count()
+        look = self._looks.get(publisher)
+        # Who has just been matched may not be named yet.
+        if look is None or number != look.number or not look.is_heard:
+            look = self._look(publisher, number)
         return look.is_heard
+
+    def _look_again(self) -> None:
+        """Look for those who have taken others' places."""
+        for publisher in self._looks:
+            self._look(publisher, publisher.get_subscription_count())
+
+    def _look(self, publisher: Publisher, number: int) -> '_Look':
+        """Return a new look at what a publisher's topic has, and keep it."""
+        look = _Look(number, bool(listeners(self._node, publisher.topic_name)))
+        self._looks[publisher] = look
+        return look
 
 
 class _Look(NamedTuple):
-    """A look at a topic: number of subscribers, when it was [s], whether one is no recorder."""
+    """A look at a topic: number of subscribers, whether one is no recorder."""
 
     number: int
-    time: float
     is_heard: bool
 
 

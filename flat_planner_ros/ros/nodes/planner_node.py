@@ -47,7 +47,6 @@ from flat_planner_ros.ros.wire.message_types import UnknownType
 from flat_planner_ros.ros.wire.verdict_text import log_line, values_of
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -68,10 +67,7 @@ class PlannerNode(GuardedNode):
         self._offset = OffsetFilter()
         self._open_publishers()
         self._listen()
-        efforts = self.create_publisher(
-            Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
-        )
-        self._efforts = EffortStream(self, efforts, self._session)
+        self._efforts = EffortStream(self, self._outlet.efforts, self._session)
         self._adoption = ModelAdoption(
             self,
             self._log,

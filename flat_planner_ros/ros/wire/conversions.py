@@ -312,8 +312,8 @@ def flat_plan_bytes(track: Track) -> bytes:
     """Return the flat outputs of a command and the higher derivatives of y1, serialised."""
     flat = track.flat
     names = [f'y{k + 1}' for k in range(len(flat))] + ['y1_d3']
-    tables = [np.vstack([flat[:, k], flat[0, k + 3]]).T for k in range(3)]
-    return trajectory_bytes(names, stamps.sec_and_nanosec(track.start), track.times, tables)
+    tables = np.concatenate([flat[:, :3], flat[:1, 3:]]).transpose(1, 2, 0)
+    return trajectory_bytes(names, stamps.sec_and_nanosec(track.start), track.times, [*tables])
 
 
 def effort_msg(efforts: FloatArray) -> Float64MultiArray:

@@ -80,19 +80,20 @@ def trajectory_bytes(
     widths = [table.shape[1] for table in tables] + [0] * (ARRAYS - len(tables))
     first = point_type(body, widths)
     other = point_type(body + first.itemsize, widths)
-    rest = len(front) + first.itemsize
-    message = np.zeros(rest + (len(times) - 1) * other.itemsize, dtype=np.uint8)
-    message[: len(front)] = np.frombuffer(front, dtype=np.uint8)
-    seconds, nanoseconds = np.divmod(np.rint(times * NANOSECONDS).astype(np.int64), NANOSECONDS)
-    for points, part in (
-        (message[len(front) : rest].view(first), slice(1)),
-        (message[rest:].view(other), slice(1, None)),
-    ):
-        for field, (width, table) in enumerate(zip(widths, tables, strict=False)):
+    # From its first numbers on the first point is as the others are: only the length before them
+    # may stand elsewhere, and what is written in its place gives way to what belongs there.
+    begin = len(front) + first.itemsize - other.itemsize
+    message = np.zeros(begin + len(times) * other.itemsize, dtype=np.uint8)
+    points = message[begin:].view(other)
+    for field, (width, table) in enumerate(zip(widths, tables, strict=False)):
+        if width:
             points[f'length{field}'] = width
-            if width:
-                points[f'values{field}'] = table[part]
-        points['sec'], points['nanosec'] = seconds[part], nanoseconds[part]
+            points[f'values{field}'] = table
+    points['sec'], points['nanosec'] = np.divmod(
+        np.rint(times * NANOSECONDS).astype(np.int64), NANOSECONDS
+    )
+    head = front + LENGTH.pack(widths[0]) + bytes(max(begin - len(front), 0))
+    message[: len(head)] = np.frombuffer(head, dtype=np.uint8)
     return message.tobytes()
 
 

@@ -16,7 +16,7 @@
 
 from flat_planner_ros.core import MotionRequest, plan, PlanningOptions
 from flat_planner_ros.core.arm import InvalidCommand
-from flat_planner_ros.core.session import Track
+from flat_planner_ros.core.session import Piece, Track
 from flat_planner_ros.ros.parameters.planner import build, ROWS
 from flat_planner_ros.ros.wire.command_form import CommandForm
 from flat_planner_ros.ros.wire.conversions import command_bytes
@@ -60,15 +60,7 @@ def track():
     paper_arm = build(GIVEN).session.arm
     request = MotionRequest(start=(0.0, 0.0), final=(np.pi, 0.0), duration=1.0)
     samples = plan(request, paper_arm, PlanningOptions()).sample(0.005)
-    return Track(
-        start=1.7e9,
-        times=samples.times,
-        positions=samples.positions,
-        velocities=samples.velocities,
-        accelerations=samples.accelerations,
-        efforts=samples.efforts,
-        flat=np.zeros((1, 6, len(samples.times))),
-    )
+    return Track(start=1.7e9, times=samples.times, pieces=(Piece(samples, slice(None)),))
 
 
 @pytest.mark.parametrize(('form', 'points', 'size'), SIZES)
