@@ -14,12 +14,16 @@
 
 """The whole model of the last two links from one motion and what it leaves behind."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, PlanarArm
-from flat_planner_ros.core.model_fit import fit_model, Measurements, ModelFit
 import numpy as np
+
+if TYPE_CHECKING:
+    from flat_planner_ros.core.model_fit import ModelFit
 
 RELATIVE_ERROR = 0.02
 """Largest standard error of an inertia or the stiffness, relative to it [-]."""
@@ -51,7 +55,7 @@ class LastLinks(NamedTuple):
     coulomb: float
 
     @classmethod
-    def of(cls, arm: PlanarArm) -> 'LastLinks':
+    def of(cls, arm: PlanarArm) -> LastLinks:
         """Return the values of a flat arm."""
         friction = float(arm.viscous_friction[-1]), float(arm.coulomb_friction[-1])
         return cls(*arm.inertia_star, arm.stiffness, arm.damping, *friction)
@@ -125,6 +129,9 @@ def estimate_model(
         Whether efforts are those of a feedback, as of `Measurements`.
 
     """
+    # Loaded when a motion is over: a node that has just started need not wait for it.
+    from flat_planner_ros.core.model_fit import fit_model, Measurements
+
     known = np.isfinite(efforts[:, :-1]).all(axis=1)
     if not known.any():
         return ModelEstimate(reason='the efforts of the motors are not measured')

@@ -238,14 +238,16 @@ class LawTrajectory:
     def jets(self, times: FloatArray) -> FloatArray:
         """Return the derivatives 0 to 6 at times clipped to the motion, shape (n - 1, 7, m)."""
         duration = self.problem.duration
-        clipped = np.clip(times, 0.0, duration)
-        planned = np.array([law.jet(clipped, JET_ORDER) for law in self.laws])
+        clipped = np.minimum(np.maximum(times, 0.0), duration)
+        tables = [law.jet(clipped, JET_ORDER) for law in self.laws]
+        planned = tables[0][None] if len(tables) == 1 else np.array(tables)
         # The certified ends take their exact values, as those of a motion from rest do.
-        ends = np.zeros_like(self.start)
-        ends[:, 0] = self.final
-        for reached, end in ((clipped <= 0.0, self.start), (clipped >= duration, ends)):
-            if reached.any():
-                planned[:, :CONDITIONS, reached] = end[..., None]
+        is_first, is_last = clipped <= 0.0, clipped >= duration
+        if is_first.any():
+            planned[:, :CONDITIONS, is_first] = self.start[..., None]
+        if is_last.any():
+            planned[:, :CONDITIONS, is_last] = 0.0
+            planned[:, 0, is_last] = self.final[:, None]
         return planned
 
     def on_even_grid(self, intervals: int) -> tuple[FloatArray, FloatArray]:

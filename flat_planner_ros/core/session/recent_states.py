@@ -19,7 +19,6 @@ from collections.abc import Iterable
 from math import tau
 
 from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, PlanarArm
-from flat_planner_ros.core.model_fit import seen_stiffness
 from flat_planner_ros.core.planning import PlanSamples
 from flat_planner_ros.core.session.timeline import Motion
 from flat_planner_ros.core.tracking import ArmObserver, Estimate
@@ -148,6 +147,9 @@ def _as_it_swings(arm: PlanarArm, seen: list[JointSample], swing: float) -> Plan
 
     Carried forward by a spring 10 % off, a swing would soon be 5 % of itself beside the arm.
     """
+    # Loaded where an arm swings: a tenth of what a planner loads, which need not wait for it.
+    from flat_planner_ros.core.model_fit import seen_stiffness
+
     times = np.array([sample.time for sample in seen])
     angles = np.array([sample.positions for sample in seen])
     factor, error = seen_stiffness(times, angles.sum(axis=1), angles[:, -1], arm, swing)

@@ -84,7 +84,7 @@ class Motion:
     remarks: tuple[str, ...] = ()
     duration_factor: float = 1.0
 
-    @property
+    @cached_property
     def end(self) -> float:
         """Return the absolute time from which it has no say [s]."""
         return self.start + self.plan.duration if self.cut is None else self.cut
@@ -204,8 +204,10 @@ class Timeline:
     def after(self, now: float) -> 'Timeline':
         """Return the timeline without what has come to its end."""
         ended = [motion for motion in self.known if motion.end <= now]
+        if not ended or ended[-1] is self._past:
+            return self
         left = [motion for motion in self.motions if now < motion.end]
-        return Timeline(left, ended[-1] if ended else self._past)
+        return Timeline(left, ended[-1])
 
     def with_motion(self, motion: Motion) -> 'Timeline':
         """Return the timeline in which a motion replaces all that was planned from its start."""

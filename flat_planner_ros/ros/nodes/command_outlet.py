@@ -22,9 +22,9 @@ from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
 from flat_planner_ros.ros.wire.command_form import WHOLE
 from flat_planner_ros.ros.wire.message_types import message_class, UnknownType
-from std_msgs.msg import Float64MultiArray
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+EFFORTS = 'std_msgs/msg/Float64MultiArray'
 
 
 class CommandOutlet:
@@ -61,7 +61,7 @@ class CommandOutlet:
         self._plan = node.create_publisher(kind, interfaces.PLAN, interfaces.LATCHED)
         self._flat_plan = node.create_publisher(kind, interfaces.FLAT_PLAN, interfaces.LATCHED)
         self.efforts = node.create_publisher(
-            Float64MultiArray, interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
+            message_class(EFFORTS), interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
         )
 
     def publish(self, track: Track, settings: PlannerSettings) -> None:

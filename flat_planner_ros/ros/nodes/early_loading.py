@@ -33,10 +33,13 @@ LOADING = Lock()
 LOADED = Event()
 """Set once a node of this process has loaded all that it will need."""
 
-PLANNING = ('scipy.linalg.lapack', 'scipy.optimize')
+FIT = 'flat_planner_ros.core.model_fit'
+"""The wing that tells how an arm swings, and its whole model."""
+
+PLANNING = ('scipy.linalg.lapack', 'scipy.optimize', FIT)
 """Modules that planning through via points, in motion or from a swing needs."""
 
-REPORTING = ('scipy.fft', 'scipy.integrate', 'scipy.optimize')
+REPORTING = ('scipy.fft', 'scipy.integrate', 'scipy.optimize', FIT)
 """Modules that the report on a motion needs."""
 
 DELAY = 0.1

@@ -14,9 +14,11 @@
 
 """Messages to core types and back; the only place where one becomes the other."""
 
+from __future__ import annotations
+
 from array import array
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from flat_planner_ros.core.arm import (
     Drive,
@@ -27,7 +29,6 @@ from flat_planner_ros.core.arm import (
 )
 from flat_planner_ros.core.monitor import joint_indices, PlannedMotion, Residual
 from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
-from flat_planner_ros.core.plant import ArmState, EffortProfile
 from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
 from flat_planner_ros.ros.wire import stamps
 from flat_planner_ros.ros.wire.command_form import CommandForm, WHOLE
@@ -43,6 +44,9 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory
+
+if TYPE_CHECKING:
+    from flat_planner_ros.core.plant import ArmState, EffortProfile
 
 Message = TypeVar('Message')
 
@@ -241,6 +245,9 @@ def effort_profile(
         The trajectory cannot be played as it stands.
 
     """
+    # A plant alone needs it, and has loaded it.
+    from flat_planner_ros.core.plant import EffortProfile
+
     names = list(points.joint_names)
     if sorted(names) not in (sorted(joints), sorted(joints[:-1])):
         raise InvalidCommand(f'joints are {names}, expected {list(joints)}')
@@ -356,7 +363,7 @@ def _joint_state_msg(
     return msg
 
 
-def _doubles(values: FloatArray) -> 'array[float]':
+def _doubles(values: FloatArray) -> array[float]:
     """Return what a float64[] field takes without looking at every number."""
     return array('d', np.ascontiguousarray(values, dtype=float).tobytes())
 
