@@ -30,7 +30,6 @@ CORE_TESTS = CHECKOUT / 'test' / 'core'
 KNOWN_SKIPS = {
     'launch_ros': 'comes with ROS only',
     'ros2launch': 'comes with ROS only',
-    'ament_copyright': 'comes with ROS only',
     'no Chromium': 'a program of the system',
     'no Node.js': 'a program of the system',
     'control_msgs': 'comes with ROS, or is made where there is a compiler',

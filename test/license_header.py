@@ -39,12 +39,17 @@ HEADER = """\
 """
 
 
-def without_header() -> list[Path]:
-    """Return the Python files that lack the header."""
+def python_files() -> list[Path]:
+    """Return all Python files."""
     files = [CHECKOUT / 'setup.py']
     for folder in FOLDERS:
         files += sorted((CHECKOUT / folder).rglob('*.py'))
-    return [path for path in files if not path.read_text('utf-8').startswith(HEADER)]
+    return files
+
+
+def without_header() -> list[Path]:
+    """Return the Python files that lack the header."""
+    return [path for path in python_files() if not path.read_text('utf-8').startswith(HEADER)]
 
 
 if __name__ == '__main__':

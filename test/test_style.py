@@ -15,6 +15,8 @@
 """ROS's own linters, where they are installed, and what they cannot tell."""
 
 from configparser import ConfigParser
+from importlib import import_module
+from importlib.util import find_spec
 import os
 from pathlib import Path
 import re
@@ -22,7 +24,8 @@ import shutil
 import subprocess
 from xml.etree import ElementTree
 
-from license_header import FOLDERS, without_header
+from clean_files import CleanFiles
+from license_header import FOLDERS, python_files, without_header
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -88,22 +91,85 @@ def checkout(monkeypatch):
     monkeypatch.chdir(CHECKOUT)
 
 
-def test_flake8_as_ros_has_it(checkout):
+@pytest.fixture
+def memory(request, tmp_path):
+    """Return where linters keep what they found: the cache of pytest, where there is one."""
+    cache = getattr(request.config, 'cache', None)
+    return cache.mkdir('linters') if cache else tmp_path
+
+
+def test_flake8_as_ros_has_it(checkout, memory):
     linter = pytest.importorskip('ament_flake8.main')
-    failed, errors = linter.main_with_errors(
-        ['--config', str(CONFIGURATION), *FOLDERS, 'setup.py']
-    )
-    assert not failed, '\n'.join(errors)
+    clean = CleanFiles(memory, 'flake8', CONFIGURATION.read_text('utf-8'))
+    if files := clean.others(python_files()):
+        failed, errors = linter.main_with_errors(['--config', str(CONFIGURATION), *names(files)])
+        assert not failed, '\n'.join(errors)
+        clean.remember(python_files())
 
 
-def test_pep257_as_ros_has_it(checkout):
+def test_pep257_as_ros_has_it(checkout, memory):
     linter = pytest.importorskip('ament_pep257.main')
-    assert linter.main([*FOLDERS, 'setup.py']) == 0
+    clean = CleanFiles(memory, 'pep257')
+    if files := clean.others(python_files()):
+        assert linter.main(names(files)) == 0
+        clean.remember(python_files())
+
+
+def names(files):
+    """Return the names of files as seen from the checkout."""
+    return [str(path.relative_to(CHECKOUT)) for path in files]
+
+
+def test_linters_look_at_what_is_not_known_to_be_clean(tmp_path):
+    files = [tmp_path / 'a.py', tmp_path / 'b.py']
+    for path in files:
+        path.write_text('x = 1\n')
+    assert CleanFiles(tmp_path, 'one').others(files) == files
+    CleanFiles(tmp_path, 'one').remember(files)
+    assert CleanFiles(tmp_path, 'one').others(files) == []
+    assert CleanFiles(tmp_path, 'another').others(files) == files
+    assert CleanFiles(tmp_path, 'one', 'in another way').others(files) == files
+    files[0].write_text('x = 2\n')
+    assert CleanFiles(tmp_path, 'one').others(files) == files[:1]
+    CleanFiles(tmp_path, 'one').remember(files)
+    files[0].write_text('x = 1\n')
+    assert CleanFiles(tmp_path, 'one').others(files) == files[:1]
 
 
 def test_copyright_as_ros_has_it(checkout):
-    linter = pytest.importorskip('ament_copyright.main')
-    assert linter.main([*FOLDERS, 'setup.py']) == 0
+    """Where ROS's linter is not installed, what it looks for is looked for here."""
+    if find_spec('ament_copyright'):
+        assert import_module('ament_copyright.main').main([*FOLDERS, 'setup.py']) == 0
+    else:
+        assert not [path for path in python_files() if not has_notice(path.read_text('utf-8'))]
+
+
+def has_notice(text):
+    """Tell whether a file begins with a copyright and the notice that the licence asks for."""
+    licence = (CHECKOUT / 'LICENSE').read_text('utf-8').split()
+    notice = licence[len(licence) - licence[::-1].index('Licensed') - 1 :]
+    comment = re.match(r'(?:#.*\n)+', text)
+    first, *others = comment[0].replace('#', '').strip().splitlines() if comment else ['']
+    return (
+        re.fullmatch(r'Copyright \d{4}(-\d{4})? \w.*', first) is not None
+        and ' '.join(others).split() == notice
+    )
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ('Copyright 2026', 'Copyright'),
+        ('2026 flat_planner_ros developers', '2026'),
+        ('Apache License', 'MIT License'),
+        ('# limitations under the License.\n', ''),
+        ('# Copyright', '\n# Copyright'),
+    ],
+)
+def test_a_notice_that_is_not_the_licence_s_is_noticed(old, new):
+    text = Path(__file__).read_text('utf-8')
+    assert has_notice(text)
+    assert not has_notice(text.replace(old, new, 1))
 
 
 def test_every_file_has_the_licence_header():

@@ -14,7 +14,7 @@
 
 """Moving pictures of an arm: what it does beside what it should, and its swing over time."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,10 +24,14 @@ from flat_planner_ros.figures.file_plot import plt
 from matplotlib import animation
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 import numpy as np
 
 FRAME_RATE = 25
 """Pictures in a second; a GIF counts hundredths of seconds [Hz]."""
+
+DOTS = 80
+"""Resolution of the picture [1/in]."""
 
 CARD = '#f5f7fa'
 """Background, quiet on light and on dark pages."""
@@ -93,14 +97,13 @@ def animate(scenes: Sequence[Scene], path: Path) -> None:
     last = max(float(scene.times[-1]) for scene in scenes)
     count = round((last - first) * FRAME_RATE) + 1
     figure, panels = _panels(scenes)
-    moving = animation.FuncAnimation(
-        figure,
-        lambda index: _at(panels, first + index / FRAME_RATE),
-        frames=count,
-        blit=False,
-    )
     writer: Any = animation.PillowWriter if path.suffix == '.gif' else animation.FFMpegWriter
-    moving.save(path, writer=writer(fps=FRAME_RATE), dpi=80, savefig_kwargs={'facecolor': CARD})
+    film = writer(fps=FRAME_RATE)
+    with film.saving(figure, path, dpi=DOTS):
+        for index in range(count):
+            for panel in panels:
+                panel.show(first + index / FRAME_RATE)
+            film.grab_frame(facecolor=CARD)
     plt.close(figure)
 
 
@@ -131,6 +134,11 @@ class _Panel:
         course.spines[['top', 'right']].set_visible(False)
         course.set_xlabel('time [s]', fontsize=9)
         (self._course,) = course.plot([], [], color=SWING, linewidth=1.6)
+
+    @property
+    def moving(self) -> tuple[Line2D, ...]:
+        """Return what `show` moves."""
+        return self._ghost, self._arm, self._link, self._joints, self._course
 
     def show(self, time: float) -> None:
         """Move to a time."""
@@ -166,6 +174,7 @@ def _panels(scenes: Sequence[Scene]) -> tuple[Figure, list[_Panel]]:
         sharey='row',
         height_ratios=(2.2, 1.0),
         layout='constrained',
+        dpi=DOTS,
         facecolor=CARD,
     )
     room = SWING_ROOM * max(float(np.abs(scene.positions[:, -1]).max()) for scene in scenes)
@@ -173,13 +182,14 @@ def _panels(scenes: Sequence[Scene]) -> tuple[Figure, list[_Panel]]:
     columns = zip(scenes, *axes, strict=True)
     panels = [_Panel(scene, place, course, room) for scene, place, course in columns]
     # Once is enough: nothing that moves changes the room that it takes.
-    figure.canvas.draw()
+    canvas: Any = figure.canvas
+    canvas.draw()
     figure.set_layout_engine('none')
+    # What stands still is from now on a picture in the background: the larger part of the work.
+    still = np.array(canvas.buffer_rgba())
+    moving = {artist for panel in panels for artist in panel.moving}
+    for axis in axes.flat:
+        for artist in axis.get_children():
+            artist.set_visible(artist in moving)
+    figure.figimage(still, zorder=-1)
     return figure, panels
-
-
-def _at(panels: Iterable[_Panel], time: float) -> list[Any]:
-    """Show all scenes at a time."""
-    for panel in panels:
-        panel.show(time)
-    return []

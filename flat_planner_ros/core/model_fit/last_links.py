@@ -26,7 +26,7 @@ to step exactly, by a matrix exponential, and the force as a parabola.
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import coulomb_share, COULOMB_VELOCITY, FloatArray
+from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray
 import numpy as np
 import numpy.typing as npt
 
@@ -129,27 +129,25 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
         States, shape (K + 1, models, 4, segments).
 
     """
-    steps = (forcing.base.shape[0] - 1) // 2
-    states = np.empty((steps + 1, *starts.shape))
-    states[0] = starts
     whole = _linear_flow(models, forcing.step)
     # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
     drag = models[:, VISCOUS, None] * forcing.base[:, None, :]
     forces = forcing.effort[:, forcing.variant] + drag
-    pushed: FloatArray | float = 0.0
+    turned = None
     if forcing.turning is not None:
         taken = models[:, IMBALANCE, None] * forcing.turning[:, :, None]
         forces = forces - taken[:, 0]
         last = _linear_flow(models, forcing.step, on_last=True)
-        pushed = last.forced @ _triples(-taken[:, 1])
-    triples = _triples(forces)
-    pushed = pushed + whole.forced @ triples
+        turned = last.forced @ _triples(-taken[:, 1])
     if models[:, COULOMB].any():
-        half = _linear_flow(models, forcing.step / 2)
-        _add_with_friction(states, pushed, triples, models, forcing.base, whole, half)
-        return states
-    for k in range(steps):
-        states[k + 1] = whole.transition @ states[k] + pushed[k]
+        return _with_friction(starts, forces, turned, models, forcing, whole)
+    pushed = whole.forced @ _triples(forces)
+    if turned is not None:
+        pushed += turned
+    states = np.empty((len(pushed) + 1, *starts.shape))
+    states[0] = starts
+    for k, push in enumerate(pushed):
+        states[k + 1] = whole.transition @ states[k] + push
     return states
 
 
@@ -203,33 +201,79 @@ def _exponential(matrices: FloatArray) -> FloatArray:
     return total
 
 
-def _add_with_friction(
-    states: FloatArray,
-    pushed: FloatArray,
-    triples: FloatArray,
+def _with_friction(
+    starts: FloatArray,
+    forces: FloatArray,
+    turned: FloatArray | None,
     models: FloatArray,
-    base: FloatArray,
+    forcing: Forcing,
     whole: _Flow,
-    half: _Flow,
-) -> None:
-    """Fill in the states one by one; velocities for Coulomb friction are predicted in stages."""
+) -> FloatArray:
+    """
+    Return the states one by one; velocities for Coulomb friction are predicted in stages.
+
+    A row of seven is carried on: the state, then the shares of friction at the start of the step,
+    in its middle and at its end. One product takes it a step further, where the last three become
+    what the velocities of link n-1 would be without the friction of that step.
+    """
+    half = _linear_flow(models, forcing.step / 2)
+    rate = np.broadcast_to(np.eye(STATES)[2], (len(models), STATES))
+    stages = np.stack((rate, half.transition[:, 2], whole.transition[:, 2]), axis=1)
     coulomb = models[:, COULOMB, None]
-    # Of the first half step only the velocity of link n-1 is wanted.
-    flow = np.concatenate((whole.transition, half.transition[:, 2:3]), axis=1)
-    first, middle = triples[..., 0, :], triples[..., 1, :]
-    near = np.stack((first, (first + middle) / 2, middle), axis=-2)
-    pushed_half = (half.forced[:, 2:3] @ near)[:, :, 0]
-    by_half = half.forced[:, 2].sum(axis=1)[:, None]
-    by_first, by_middle, by_last = (column[:, None] for column in whole.forced[:, 2].T)
+    step = np.concatenate((whole.transition, -whole.forced * coulomb[..., None]), axis=-1)
+    flow = np.concatenate((step, stages @ step / COULOMB_VELOCITY), axis=1)
+    rows = np.empty((len(forces) // 2 + 1, len(models), STATES + 3, starts.shape[-1]))
+    _force(rows, starts, forces, turned, forcing.base, (stages, whole.forced, half.forced))
+    scale = coulomb / COULOMB_VELOCITY
+    by_half = half.forced[:, 2].sum(axis=1)[:, None] * scale
+    by_first, by_middle, by_last = (column[:, None] * scale for column in whole.forced[:, 2].T)
     by_start, by_second = by_first - by_last, by_middle + 2 * by_last
-    drags = np.empty((len(models), 3, states.shape[-1]))
-    for k, push in enumerate(pushed):
-        free = flow @ states[k]
+    before, carried = None, np.empty_like(rows[0])
+    for row in rows:
+        if before is not None:
+            np.matmul(flow, before, out=carried)
+            row += carried
         # To the middle with the friction of the start, to the end with that of the middle.
-        held = coulomb * coulomb_share(states[k, :, 2] - base[2 * k])
-        velocity = free[:, 4] + pushed_half[k] - by_half * held
-        second = coulomb * coulomb_share(velocity - base[2 * k + 1])
-        velocity = free[:, 2] + push[:, 2] - by_start * held - by_second * second
-        drags[:, 0], drags[:, 1] = held, second
-        drags[:, 2] = coulomb * coulomb_share(velocity - base[2 * k + 2])
-        states[k + 1] = free[:, :STATES] + push - whole.forced @ drags
+        held, second, last = row[:, 4], row[:, 5], row[:, 6]
+        np.tanh(held, out=held)
+        second -= by_half * held
+        np.tanh(second, out=second)
+        last -= by_start * held
+        last -= by_second * second
+        np.tanh(last, out=last)
+        before = row
+    return rows[:, :, :STATES]
+
+
+def _force(
+    rows: FloatArray,
+    starts: FloatArray,
+    forces: FloatArray,
+    turned: FloatArray | None,
+    base: FloatArray,
+    flows: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Fill in what forces and base add to rows of `_with_friction`, and the whole first row."""
+    stages, whole, half = flows
+    # Half a step spans a force, the mean of that and the next one, and the next one.
+    to_middle = np.stack((half[:, 2, 0] + half[:, 2, 1] / 2, half[:, 2, 1] / 2 + half[:, 2, 2]))
+    # The velocities of a step take the forces of that step too: five at half steps, two in common.
+    by_forces = np.zeros((len(whole), STATES + 3, 5))
+    by_forces[:, :STATES, :3] = whole
+    by_forces[:, STATES:, :3] = stages @ whole
+    ahead = np.zeros((len(whole), 3, 3))
+    ahead[:, 1, :2], ahead[:, 2] = to_middle.T, whole[:, 2]
+    by_forces[:, STATES:, 2:] += ahead
+    # After the last step there is nothing ahead, and none of it is looked at.
+    padded = np.concatenate((forces, np.zeros((2, *forces.shape[1:]))))
+    windows = np.stack([padded[j : len(padded) - 4 + j : 2] for j in range(5)], axis=-2)
+    np.matmul(by_forces, windows, out=rows[1:])
+    rows[0, :, :STATES] = starts
+    rows[0, :, STATES:] = stages @ starts + ahead @ windows[0, :, :3]
+    if turned is not None:
+        rows[1:, :, :STATES] += turned
+        rows[1:, :, STATES:] += stages @ turned
+        rows[:-1, :, STATES + 2] += turned[:, :, 2]
+    past = np.concatenate((base, np.zeros((2, base.shape[1]))))
+    rows[:, :, STATES:] -= np.stack((past[:-2:2], past[1:-1:2], past[2::2]), axis=1)[:, None]
+    rows[:, :, STATES:] /= COULOMB_VELOCITY
