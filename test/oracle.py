@@ -186,7 +186,7 @@ def solve(roots: Roots, duration: float, start, end) -> ReferenceLaw:
         for side, ends in enumerate((start, end)):
             for n, value in enumerate(ends):
                 target[side * CONDITIONS + n] = mp.mpf(float(value)) * length**n
-        weights = mp.lu_solve(matrix, target)
+        weights = linear_solution(matrix, target)
         return ReferenceLaw(
             duration=length,
             terms=[
@@ -194,6 +194,33 @@ def solve(roots: Roots, duration: float, start, end) -> ReferenceLaw:
                 for function, weight in zip(functions, weights, strict=True)
             ],
         )
+
+
+def linear_solution(matrix: mp.matrix, target: mp.matrix) -> list[mp.mpc]:
+    """
+    Return the solution of linear equations by elimination with scaled partial pivoting.
+
+    As `mp.lu_solve`, but on lists, and without what is zero: a fifth of the time for a path.
+    """
+    size = matrix.rows
+    rows = [[*(matrix[i, j] for j in range(size)), target[i]] for i in range(size)]
+    scales = [1 / sum(map(abs, row[:size])) for row in rows]
+    for k in range(size):
+        _, best = max((scales[i] * abs(rows[i][k]), i) for i in range(k, size))
+        rows[k], rows[best] = rows[best], rows[k]
+        scales[k], scales[best] = scales[best], scales[k]
+        pivot = rows[k]
+        occupied = [j for j in range(k + 1, size + 1) if pivot[j]]
+        for row in rows[k + 1 :]:
+            if row[k]:
+                factor = row[k] / pivot[k]
+                for j in occupied:
+                    row[j] -= factor * pivot[j]
+    found: list[mp.mpc] = [mp.mpf(0)] * size
+    for k in reversed(range(size)):
+        known = sum((rows[k][j] * found[j] for j in range(k + 1, size) if rows[k][j]), mp.mpf(0))
+        found[k] = (rows[k][size] - known) / rows[k][k]
+    return found
 
 
 def _derivatives(rate: mp.mpc, power: int, u: mp.mpf, order: int) -> list[mp.mpc]:

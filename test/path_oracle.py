@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import mpmath as mp
 import numpy as np
-from oracle import _derivatives, CONDITIONS, ReferenceLaw, Roots, solutions
+from oracle import _derivatives, CONDITIONS, linear_solution, ReferenceLaw, Roots, solutions
 
 ORDERS = 2 * CONDITIONS
 """Derivatives 0 to 11."""
@@ -113,7 +113,7 @@ def solve_path(
                 for n in range(10):
                     matrix[row + 1 + n, first + ORDERS + i] = -column[n]
                 matrix[row + 11, first + ORDERS + i] = -(column[10] + ratio * column[11])
-        weights = mp.lu_solve(matrix, target)
+        weights = linear_solution(matrix, target)
         laws = []
         for j, h in enumerate(lengths):
             terms = [
