@@ -23,6 +23,7 @@ import gc
 from importlib import import_module
 import os
 import signal
+import sys
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -118,6 +119,12 @@ def _run_tool(module: str) -> int:
 
 def _run(module: str, interrupted: int = 0) -> int:
     """Load a module of the ROS layer and run its `main`; return the exit code."""
+    if sys.argv[1:] == ['--version']:
+        # Imported here: the start of a node does not need it. Nor does the answer need a library.
+        from flat_planner_ros.version import version_line
+
+        print(version_line())
+        return 0
 
     def leave(_number: int, _frame: FrameType | None) -> None:
         # No exception: it would come up in the middle of an import, where some libraries turn it

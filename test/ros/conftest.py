@@ -255,11 +255,23 @@ class Graph:
             pytest.fail(f'not within {timeout:g} s: {what}; last heard:{said}')
 
     def collect(
-        self, message_type: type, topic: str, qos: Any = 1000, *, matched: bool = True
+        self,
+        message_type: type,
+        topic: str,
+        qos: Any = 1000,
+        *,
+        matched: bool = True,
+        raw: bool = False,
     ) -> list[Any]:
-        """Return a list that grows with every message; wait for a publisher unless told not to."""
+        """
+        Return a list that grows with every message; wait for a publisher unless told not to.
+
+        It grows by bytes if they are wanted `raw`: long motions take seconds to become objects.
+        """
         messages: list[Any] = []
-        subscription = self.probe.create_subscription(message_type, topic, messages.append, qos)
+        subscription = self.probe.create_subscription(
+            message_type, topic, messages.append, qos, raw=raw
+        )
         if matched:
             self.expect(subscription.get_publisher_count, f'a publisher of {topic}')
         return messages

@@ -116,15 +116,20 @@ class Rig:
         self.graph = graph
         self.namespace = namespace
 
-    def hear(self, kind, topic, qos=1000, *, matched=True):
-        """Return a list that grows with every message on a topic of this arm."""
-        return self.graph.collect(kind, self.namespace + topic, qos, matched=matched)
+    def hear(self, kind, topic, qos=1000, **options):
+        """Return a list that grows with every message on a topic of this arm; see `collect`."""
+        return self.graph.collect(kind, self.namespace + topic, qos, **options)
 
-    def hear_planner(self, *, matched=True):
-        """Listen to the planner; `matched`, here and below, waits until it is found."""
+    def hear_planner(self, *, matched=True, raw=False):
+        """
+        Listen to the planner; `matched`, here and below, waits until it is found.
+
+        Plans and commands that are heard `raw` are bytes.
+        """
+        options = {'matched': matched, 'raw': raw}
         self.status = self.hear(DiagnosticArray, STATUS, EVERY_VERDICT, matched=matched)
-        self.plans = self.hear(JointTrajectory, PLAN, interfaces.LATCHED, matched=matched)
-        self.commands = self.hear(JointTrajectory, COMMAND, matched=matched)
+        self.plans = self.hear(JointTrajectory, PLAN, interfaces.LATCHED, **options)
+        self.commands = self.hear(JointTrajectory, COMMAND, **options)
 
     def hear_plant(self, *, qos=1000, matched=True):
         """Listen to the plant; with a long queue all is heard, but on a busy machine late."""

@@ -27,14 +27,18 @@ from std_msgs.msg import Float64MultiArray
 EFFORTS = '/flat_tracker/effort_commands'
 ELDER = 'another tracker moves this arm and was started before'
 
+RATE = 250.0
+"""Joint states and efforts per second of simulated time [Hz]."""
+
 PLANT = {
     'input': 'tracker',
-    'publish_rate': 500.0,
+    'input_timeout': 0.2,
+    'publish_rate': RATE,
     'publish_clock': 'true',
-    'real_time_factor': 0.25,  # a busy machine has four times the time for a period
+    'real_time_factor': 0.5,  # a busy machine has 8 ms for a period
     'encoder.resolution': tau / 2**14,
 }
-TRACKER = {'use_sim_time': 'true', 'timeout': 0.2, 'max_age': 0.1}
+TRACKER = {'use_sim_time': 'true', 'rate': RATE, 'timeout': 0.4, 'max_age': 0.2}
 
 
 def arguments(values):
@@ -84,12 +88,18 @@ class Tracked(Rig):
 
     def move_until_rivals_meet(self, *positions):
         """Move until a tracker leaves it to another, which may not hear at first; return where."""
+        return self.move_until(
+            self.has_met, 'a tracker that leaves the arm to another', *positions
+        )
+
+    def move_until(self, condition, what, *positions):
+        """Move, to one position after the other, until a condition holds; return where to."""
         for position in positions:
             self.move(position)
-            self.graph.spin_until(lambda: self.has_met() or stamp(self.states[-1]) > self.end)
-            if self.has_met():
+            self.graph.spin_until(lambda: condition() or stamp(self.states[-1]) > self.end)
+            if condition():
                 return position
-        return pytest.fail('no tracker leaves the arm to the other')
+        return pytest.fail(f'in none of {len(positions)} motions: {what}')
 
     def has_met(self):
         """Return whether a tracker leaves the arm to another."""

@@ -198,11 +198,13 @@ def _told(
     free = list(range(len(NAMES)))
     while True:
         found = refine(observed, found.parameters, free, scales, found.spread, found.starts)
-        ratio = np.sqrt(np.diag(covariance(found.around, scales[free])))
+        variances = np.diag(covariance(found.around, scales[free]))
+        # Of what is not told at all, rounding may make the variance negative.
+        ratio = np.sqrt(np.where(variances >= 0.0, variances, np.inf))
         if not free or ratio.max() <= TOLD:
             return found, free
         # Parameters that only together are told have errors of one size.
-        vague = [free[i] for i in np.flatnonzero(ratio > max(TOLD, 0.01 * ratio.max()))]
+        vague = [free[i] for i in np.flatnonzero(ratio >= max(TOLD, 0.01 * ratio.max()))]
         given_up = next(index for index in GIVEN_UP_FIRST if index in vague)
         free.remove(given_up)
         parameters = found.parameters.copy()

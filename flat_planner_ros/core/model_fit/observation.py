@@ -58,6 +58,11 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
     """Return the last two links in absolute angles."""
     if not np.ptp(measurements.positions, axis=0).any():
         raise InvalidRequest('no joint moves in the measurements: only motions tell a model')
+    if not np.ptp(measurements.positions[:, -1]):
+        raise InvalidRequest(
+            f'joint {measurements.joints} stands still in all {measurements.times.size} '
+            'measurements: only its swings tell a model'
+        )
     times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
     span = max(SMOOTHING * period, FEWEST * measurements.period)
     _, rates, accelerations = derivatives(times, angles, span)

@@ -51,7 +51,6 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from scipy.integrate import trapezoid
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -290,6 +289,9 @@ class Experimenter(Node):
         self._check(played, motion)
         amplitude = self._amplitude(self._reports[0].status[0], played)
         planned = of_joint_1(motion.efforts)
+        # Imported here: it takes half a second, in which the nodes start by themselves.
+        from scipy.integrate import trapezoid
+
         rms = float(np.sqrt(trapezoid(planned**2, motion.times) / DURATION))
         peak = float(np.abs(played.efforts).max() / np.abs(planned).max())
         return Result(scenario, method.name, rms, amplitude, played, self._drive, peak)

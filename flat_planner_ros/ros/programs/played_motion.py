@@ -23,7 +23,6 @@ from flat_planner_ros.figures.paper_example import DURATION, Recording
 from flat_planner_ros.ros.parameters.arm_model import EXAMPLE_ARM
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 PLAYED_TOLERANCE = 1e-3
 """Largest difference of applied and planned effort in a valid run, relative to the peak [-]."""
@@ -65,6 +64,9 @@ def is_played(recording: Recording, motion: PlannedMotion, drive: Drive) -> bool
     moving = (recording.times >= 0.0) & (recording.times <= DURATION)
     times = recording.times[moving]
     if drive is Drive.POSITION:
+        # Imported here: SciPy's splines take as long to load as all else together.
+        from scipy.interpolate import CubicSpline
+
         # What a servo needs depends on the true arm; where it has to be does not.
         wanted = CubicSpline(motion.times, motion.positions[:, 0])(times)
         given, tolerance = recording.positions[moving, 0], FOLLOWED_TOLERANCE

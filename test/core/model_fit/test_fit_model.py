@@ -261,6 +261,10 @@ def test_what_tells_nothing_is_refused():
         )
     with pytest.raises(InvalidRequest, match='no joint moves'):
         fit_model(replace(seen, positions=0.0 * seen.positions), BELIEVED)
+    # As after a goal where the arm is already: an encoder takes a step, and nothing swings.
+    step = np.outer(seen.times > 0.5, [2 * pi / 2**14, 0.0])
+    with pytest.raises(InvalidRequest, match='joint 2 stands still'):
+        fit_model(replace(seen, positions=step, efforts=0.0 * seen.efforts), BELIEVED)
     with pytest.raises(InvalidRequest, match='fewest'):
         Measurements(times=seen.times[:9], positions=seen.positions[:9], efforts=seen.efforts[:9])
     with pytest.raises(InvalidRequest, match='increase'):

@@ -414,7 +414,7 @@ def test_an_internal_error_is_a_verdict_too(more, graph):
     words = [word for parameter in parameters for word in ('-p', parameter)]
     process = graph.start('planner_node', '--ros-args', *words)
     planner = Rig(graph)
-    planner.hear_planner()
+    planner.hear_planner(raw=True)
     assert planner.ask(goal(duration=0.3))['state'] == 'ACCEPTED'
     graph.expect(lambda: planner.verdicts('FINISHED'), 'the end')
     _, most = resource.prlimit(process.pid, resource.RLIMIT_AS)

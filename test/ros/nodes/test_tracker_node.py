@@ -131,11 +131,12 @@ def test_a_tracker_that_is_held_up_again_and_again_lets_go_with_one_error(graph)
     arm = Tracked(graph, **{'friction.coulomb': '[0.0005]'})
     arm.tracker.kill()
     arm.start_tracker(max_age=0.0)
-    arm.move(0.5)
-    # A machine may be so busy that it lets go before it has moved the arm.
-    graph.expect(
+    # A machine may be so busy that it lets go before it has moved the arm. And a tracker in the
+    # place of one that was killed may not hear the first command.
+    arm.move_until(
         lambda: arm.states[-1].position[0] > 0.01 or graph.logged('given up'),
         'a motion',
+        *(0.5, 0.5, 0.5),
     )
     for _ in range(50):
         arm.tracker.pause()
@@ -150,4 +151,5 @@ def test_a_tracker_that_is_held_up_again_and_again_lets_go_with_one_error(graph)
     (error,) = graph.logged('given up')
     assert 'joint sample' in error
     assert max(abs(state.position[1]) for state in arm.states) < 0.3
-    assert not any(state.effort[0] for state in arm.states[-10:])
+    # What the tracker has sent may reach a busy plant later than this test.
+    graph.expect(lambda: not any(state.effort[0] for state in arm.states[-10:]), 'no effort')

@@ -49,6 +49,18 @@ def test_every_program_has_a_version(name):
     assert answer.stdout.decode().strip() == version_line()
 
 
+@pytest.mark.parametrize('arguments', [['--version'], ['--version', '--unknown']])
+@pytest.mark.parametrize('name', PROGRAMS)
+def test_so_has_its_command_line(name, arguments, monkeypatch, capsys):
+    wing = 'nodes' if name.endswith('_node') else 'programs'
+    module = 'study.program' if name == 'study' else f'{wing}.{name}'
+    monkeypatch.setattr(sys, 'argv', [name, *arguments])
+    with pytest.raises(SystemExit) as ended:
+        import_module(f'flat_planner_ros.ros.{module}').main()
+    assert not ended.value.code
+    assert capsys.readouterr().out.strip() == version_line()
+
+
 @pytest.mark.parametrize('program', [flat_plan, tradeoff])
 @pytest.mark.parametrize(
     'twice', [['joint1=2', 'joint1=1'], ['joint1=1', '--start', 'joint1=0', 'joint1=2']]

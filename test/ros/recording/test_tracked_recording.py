@@ -92,6 +92,7 @@ def estimating_motion(arm):
     arm.graph.expect(lambda: len(arm.reports) > seen, 'a report')
     report = values(arm.reports[-1])
     if 'model.stiffness' not in report:
+        arm.wait_until(arm.end)  # where it starts next
         raise Late(arm.reports[-1].status[0].message)
     return place, report
 
