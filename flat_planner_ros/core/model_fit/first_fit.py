@@ -31,8 +31,8 @@ from flat_planner_ros.core.model_fit.first_links import (
     VISCOUS,
 )
 from flat_planner_ros.core.model_fit.judgement import correlation_length
-from flat_planner_ros.core.model_fit.last_fit import LONGER
 from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
+from flat_planner_ros.core.model_fit.observation import LONGER
 from flat_planner_ros.core.model_fit.refinement import neighbours
 from flat_planner_ros.core.model_fit.scales import FRICTION_SHARE, OFFSET_SCALE
 from flat_planner_ros.core.model_fit.signals import derivatives, span_for, stretches

@@ -83,7 +83,7 @@ def foresee(
         step=period / parts,
         effort=np.interp(grid, times, effort)[:, None, None],
         variant=np.zeros(1, dtype=np.intp),
-        base=np.zeros((grid.size, 1)),
+        base=np.zeros((grid.size, 1, 1)),
     )
     states = trajectories(model, np.zeros((1, STATES, 1)), forcing)[::parts, 0, :, 0]
     return ForeseenMotion(times=times, states=states, effort=effort)

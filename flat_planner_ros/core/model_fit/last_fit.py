@@ -35,15 +35,20 @@ from flat_planner_ros.core.model_fit.last_links import (
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
 from flat_planner_ros.core.model_fit.observation import (
-    base_rate,
     noise_of_links,
     observed_of,
+    with_base_errors,
     with_half_the_efforts,
     with_other_times,
 )
 from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, refine, Refined
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
-from flat_planner_ros.core.model_fit.simulation import CHANNELS, first_starts, Observed
+from flat_planner_ros.core.model_fit.simulation import (
+    CHANNELS,
+    first_starts,
+    Observed,
+    with_unknowns,
+)
 from flat_planner_ros.core.model_fit.starts import settled
 from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
 import numpy as np
@@ -62,9 +67,6 @@ CLEAR = 9.0
 
 UNDECIDED, DECIDED = 0.5, 0.1
 """Share of the interpolations' difference that stays as a systematic error [-]."""
-
-SHORTER, LONGER = 0.6, 1.6
-"""Factors on the span of smoothed velocities, what comes of which shows what they cost [-]."""
 
 HELD_TIMES = 4
 """Draws of the unknown times at which held efforts began to act [-]."""
@@ -115,6 +117,10 @@ def fit_last_links(
     believed = vector_of(start)
     noise = np.maximum(noise_of_links(measurements), 1e-9)
     found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
+    observed = with_base_errors(observed, measurements, period)
+    if observed.base_errors is not None:
+        # Sharper than by what is left without these errors.
+        found = found._replace(starts=with_unknowns(observed, found.starts), spread=noise)
     found, observed, other = _interpolated(observed, found, scales)
     found, free = _told(observed, found, scales, believed)
     imbalance = None
@@ -126,10 +132,6 @@ def fit_last_links(
     # Both are of second order, efforts with corners: twice the step adds three times the error.
     doubtful.append(_Doubt(1 / 3, replace(observed, refinement=observed.refinement / 2)))
     doubtful.append(_Doubt(1 / 3, with_half_the_efforts(observed)))
-    if observed.base.any():
-        for factor in (SHORTER, LONGER):
-            base = base_rate(measurements, period, factor)
-            doubtful.append(_Doubt(1.0, replace(observed, base=base)))
     if measurements.are_held:
         draws = (with_other_times(observed, seed) for seed in range(HELD_TIMES))
         doubtful += [_Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER) for draw in draws]

@@ -77,7 +77,8 @@ class Forcing(NamedTuple):
     variant
         Which of them each model takes, shape (models,).
     base
-        Angular velocity of the link before n-1, shape (2 K + 1, segments) [rad/s].
+        Angular velocity of the link before n-1, for all models or for each, shape
+        (2 K + 1, 1 or models, segments) [rad/s].
     turning
         What a coupling of both links takes from link n-1 and from link n for each unit, besides
         its part in the mass matrix, shape (2 K + 1, 2, segments) [rad/s^2]; None for nothing.
@@ -131,7 +132,7 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
     """
     whole = _linear_flow(models, forcing.step)
     # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
-    drag = models[:, VISCOUS, None] * forcing.base[:, None, :]
+    drag = models[:, VISCOUS, None] * forcing.base
     forces = forcing.effort[:, forcing.variant] + drag
     turned = None
     if forcing.turning is not None:

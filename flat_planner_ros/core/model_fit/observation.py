@@ -19,6 +19,7 @@ from itertools import pairwise
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
+from flat_planner_ros.core.model_fit.base_errors import base_errors_of, Smoothing
 from flat_planner_ros.core.model_fit.imbalance import turning_of
 from flat_planner_ros.core.model_fit.measurements import (
     encoder_step,
@@ -30,7 +31,6 @@ from flat_planner_ros.core.model_fit.signals import (
     between,
     derivatives,
     FEWEST,
-    rate_noise,
     segments_of,
     span_for,
 )
@@ -50,8 +50,8 @@ SUDDEN = 0.3
 FEW = 0.02
 """Share of samples with such changes beyond which they are the rule [-]."""
 
-QUIET = 4.0
-"""Velocity of link n-2 relative to its noise below which it counts as rest [-]."""
+LONGER = 1.6
+"""Factor on the span of smoothed velocities, what comes of which shows what they cost [-]."""
 
 
 def observed_of(measurements: Measurements, period: float) -> Observed:
@@ -66,7 +66,7 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
     times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
     span = max(SMOOTHING * period, FEWEST * measurements.period)
     _, rates, accelerations = derivatives(times, angles, span)
-    base = base_rate(measurements, period)
+    base = base_rate(measurements, base_smoothing(measurements, period))
     cuts = sudden_changes(measurements.efforts[:, -1]) if measurements.are_held else []
     segments = segments_of(times, measurements.period, SEGMENT * period, cuts)
     if not segments:
@@ -87,39 +87,31 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
     )
 
 
-def base_rate(measurements: Measurements, period: float, longer: float = 1.0) -> FloatArray:
-    """
-    Return the smoothed velocity of link n-2, shape (m,); nothing moves there with two joints.
-
-    Parameters
-    ----------
-    measurements
-        What was measured.
-    period
-        Of the free passive joint [s].
-    longer
-        Factor on the span of the polynomials [-].
-
-    """
+def base_rate(measurements: Measurements, smoothing: Smoothing) -> FloatArray:
+    """Return the smoothed velocity of link n-2, shape (m,); with two joints nothing is there."""
     if measurements.joints == 2:
         return np.zeros(measurements.times.size)
-    noise = float(np.linalg.norm(noise_of(measurements)[:-2]))
-    span = longer * span_for(noise, measurements.period, SMOOTHING * period)
     angle = measurements.positions[:, :-2].sum(axis=1, keepdims=True)
-    rate = derivatives(measurements.times, angle, span)[1][:, 0]
-    left = rate_noise(noise, measurements.period, span)
-    # Noise of a link at rest would drag joint n-1 along by Coulomb friction.
-    return _still_at_rest(rate, QUIET * left, round(span / measurements.period))
+    return derivatives(measurements.times, angle, smoothing.span)[1][:, 0]
 
 
-def _still_at_rest(rate: FloatArray, bound: float, samples: int) -> FloatArray:
-    """Return a velocity that is zero where it is within a bound for some samples in a row."""
-    loud = (np.abs(rate) > bound).astype(float)
-    near = np.ones(2 * samples + 1)
-    alone = np.convolve(np.pad(loud, samples, mode='edge'), near, mode='valid') == 0.0
-    padded = np.pad(alone.astype(float), samples)
-    result: FloatArray = np.where(np.convolve(padded, near, mode='valid') > 0.0, 0.0, rate)
-    return result
+def base_smoothing(measurements: Measurements, period: float) -> Smoothing:
+    """Return how the velocity of link n-2 is smoothed; the period is the passive joint's [s]."""
+    noise = float(np.linalg.norm(noise_of(measurements)[:-2]))
+    return Smoothing(noise, span_for(noise, measurements.period, SMOOTHING * period))
+
+
+def with_base_errors(observed: Observed, measurements: Measurements, period: float) -> Observed:
+    """Return a recording whose velocity of link n-2 may be off, as its noise has it."""
+    if not observed.base.any():
+        return observed
+    own = base_smoothing(measurements, period)
+    longer = own._replace(span=LONGER * own.span)
+    change = base_rate(measurements, longer) - observed.base
+    turning = observed.rates[:, 0] - observed.base
+    smoothing = own, longer
+    errors = base_errors_of(observed.times, turning, change, observed.segments, smoothing)
+    return replace(observed, base_errors=errors)
 
 
 def with_half_the_efforts(observed: Observed) -> Observed:

@@ -16,8 +16,9 @@
 Output-error refinement: the simulated motion is brought to the measured one.
 
 Every segment of the recording starts from four unknowns of its own, which are eliminated in each
-step of Gauss and Newton (variable projection, Golub and Pereyra 1973): what errors add up to over
-a long recording stays out, and the work and memory grow with nothing but the number of segments.
+step of Gauss and Newton (variable projection, Golub and Pereyra 1973), and with them the errors of
+the base's velocity: what errors add up to over a long recording stays out, and the work and memory
+grow with nothing but the number of segments.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,7 +33,6 @@ from flat_planner_ros.core.model_fit.last_links import (
     STIFFNESS,
 )
 from flat_planner_ros.core.model_fit.simulation import (
-    BLOCK,
     blocks,
     CHANNELS,
     first_starts,
@@ -44,6 +44,9 @@ import numpy.typing as npt
 
 DIFFERENCE = 1e-6
 """Step of the difference quotients, relative to the parameters' scales [-]."""
+
+UNIT_DIFFERENCE = 1e-3
+"""The same for errors of the base, relative to those expected [-]."""
 
 MOST_STEPS = 40
 """Largest number of linearisations."""
@@ -69,12 +72,12 @@ NEIGHBOURS = 1 / 6
 
 class Linearisation(NamedTuple):
     """
-    The misfit around one set of parameters, the starts of the segments eliminated.
+    The misfit around one set of parameters, the unknowns of the segments eliminated.
 
     Attributes
     ----------
     cost
-        Weighted sum of squares that is left with the best starts [-].
+        Weighted sum of squares that is left with the best of them [-].
     gradient
         By either channel, shape (2, free).
     normal
@@ -86,8 +89,8 @@ class Linearisation(NamedTuple):
     residuals
         What is left of either channel in each segment, not weighted, (samples, 2) [rad].
     corrections
-        For each segment the step of its start without a step of the parameters (4,), and the
-        change of that with them (4, free).
+        For each segment the step of its own unknowns without a step of the parameters (own,), and
+        the change of that with them (own, free).
 
     """
 
@@ -101,7 +104,7 @@ class Linearisation(NamedTuple):
 
 
 class Refined(NamedTuple):
-    """Parameters (8,), starts (segments, 4), spread (2,) [rad], and the last linearisation."""
+    """Parameters (8,), starts (segments, own), spread (2,) [rad], and the last linearisation."""
 
     parameters: FloatArray
     starts: FloatArray
@@ -127,7 +130,8 @@ def linearised(
     model
         Parameters in the order of `last_links.NAMES`, shape (8,).
     starts
-        States at the starts of the segments, shape (segments, 4).
+        States at the starts of the segments, and what the base is off in units of what is expected
+        of it, shape (segments, 4 or `observed.unknowns`).
     free
         Which parameters may change.
     scales
@@ -142,13 +146,16 @@ def linearised(
     scatter, rounding = np.zeros((count, count)), np.zeros((count, count))
     residuals, corrections = [], []
     pieces = _segments(observed, model, starts, free, scales)
-    for segment, (misfit, by_start, by_parameter) in zip(observed.segments, pieces, strict=True):
-        basis, triangle = np.linalg.qr((by_start / spread[:, None]).reshape(-1, STATES))
-        weighted = (misfit / spread).ravel()
-        columns = (by_parameter / spread[:, None]).reshape(weighted.size, count)
-        inside, inside_columns = basis.T @ weighted, basis.T @ columns
-        left, left_columns = weighted - basis @ inside, columns - basis @ inside_columns
-        cost += float(left @ left)
+    for segment, start, piece in zip(observed.segments, starts, pieces, strict=True):
+        whole, whole_columns, correction = _projected(*piece, start[STATES:], spread)
+        cost += float(whole @ whole)
+        shown = piece[0].size
+        left, left_columns = whole[:shown], whole_columns[:shown]
+        expected, by_expected = whole[shown:], whole_columns[shown:]
+        # The base acts on link n-1.
+        gradient[0] += by_expected.T @ expected
+        normal[0] += by_expected.T @ by_expected
+        scatter += (by_expected.T * expected**2) @ by_expected
         for channel in range(CHANNELS):
             own = left_columns[channel::CHANNELS]
             gradient[channel] += own.T @ left[channel::CHANNELS]
@@ -156,12 +163,32 @@ def linearised(
             moves = observed.moves[segment.first : segment.last, channel]
             share = observed.rounding[channel] / spread[channel]
             rounding += share**2 * _alike(own, moves)
-        scores = (left[:, None] * left_columns).reshape(len(misfit), CHANNELS, count).sum(axis=1)
+        scores = (left[:, None] * left_columns).reshape(len(piece[0]), CHANNELS, count).sum(axis=1)
         scatter += neighbours(scores, max(1, round(NEIGHBOURS * len(scores))))
         residuals.append(left.reshape(-1, CHANNELS) * spread)
-        solved = np.linalg.solve(triangle, np.column_stack((inside, inside_columns)))
-        corrections.append((-solved[:, 0], -solved[:, 1:]))
+        corrections.append(correction)
     return Linearisation(cost, gradient, normal, scatter, rounding, residuals, corrections)
+
+
+def _projected(
+    misfit: FloatArray,
+    by_own: FloatArray,
+    by_parameter: FloatArray,
+    errors: FloatArray,
+    spread: FloatArray,
+) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
+    """Return weighted misfit and slopes without a segment's own unknowns, and their correction."""
+    own, count = by_own.shape[-1], by_parameter.shape[-1]
+    # What is expected of the base's errors counts as if each had been measured to be zero.
+    weighted = np.append(misfit / spread, errors)
+    slopes = np.vstack(((by_own / spread[:, None]).reshape(-1, own), np.eye(own)[STATES:]))
+    columns = np.zeros((weighted.size, count))
+    columns[: misfit.size] = (by_parameter / spread[:, None]).reshape(misfit.size, count)
+    basis, triangle = np.linalg.qr(slopes)
+    inside, inside_columns = basis.T @ weighted, basis.T @ columns
+    solved = np.linalg.solve(triangle, np.column_stack((inside, inside_columns)))
+    correction = -solved[:, 0], -solved[:, 1:]
+    return weighted - basis @ inside, columns - basis @ inside_columns, correction
 
 
 def _alike(columns: FloatArray, moves: npt.NDArray[np.bool_]) -> FloatArray:
@@ -262,18 +289,21 @@ def _segments(
     free: Sequence[int],
     scales: FloatArray,
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Yield for each segment the misfit (m, 2) and its derivatives (m, 2, 4) and (m, 2, free)."""
+    """Yield for each segment misfit (m, 2) and its derivatives (m, 2, own) and (m, 2, free)."""
+    own = starts.shape[1]
+    by_own = np.full(own, UNIT_DIFFERENCE)
+    by_own[:STATES] = DIFFERENCE
     nudges = DIFFERENCE * scales[list(free)]
-    models = np.tile(parameters, (1 + STATES + len(free), 1))
-    models[1 + STATES + np.arange(len(free)), list(free)] += nudges
-    for first, block in blocks(observed.segments):
-        begun = np.tile(starts[first : first + BLOCK].T, (len(models), 1, 1))
-        begun[1 : 1 + STATES] += DIFFERENCE * np.eye(STATES)[:, :, None]
+    models = np.tile(parameters, (1 + own + len(free), 1))
+    models[1 + own + np.arange(len(free)), list(free)] += nudges
+    for block in blocks(observed):
+        begun = np.tile(starts[block].T, (len(models), 1, 1))
+        begun[1 : 1 + own] += np.diag(by_own)[:, :, None]
         seen = seen_of(observed, block, models, begun)
-        for segment, angles in zip(block, seen, strict=True):
+        for segment, angles in zip(observed.segments[block], seen, strict=True):
             middle = angles[:, :1]
             slopes = (angles[:, 1:] - middle).transpose(0, 2, 1)
-            by_start = slopes[:, :, :STATES] / DIFFERENCE
-            by_parameter = slopes[:, :, STATES:] / nudges
+            by_start = slopes[:, :, :own] / by_own
+            by_parameter = slopes[:, :, own:] / nudges
             measured = observed.angles[segment.first : segment.last]
             yield middle[:, 0] - measured, by_start, by_parameter

@@ -146,11 +146,6 @@ def span_for(noise: float, period: float, longest: float) -> float:
     return max(min(wanted, longest), FEWEST * period)
 
 
-def rate_noise(noise: float, period: float, span: float) -> float:
-    """Return the noise of velocities by polynomials that span a time [rad/s], as `span_for`."""
-    return float(RATE_GAIN * noise * sqrt(period) / span**1.5)
-
-
 def derivatives(
     times: FloatArray, angles: FloatArray, width: float, degree: int = 4
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -23,12 +23,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.base_errors import BaseErrors
 from flat_planner_ros.core.model_fit.last_links import (
     COULOMB,
     DELAY,
     Forcing,
     IMBALANCE,
     OFFSET,
+    STATES,
     step_for,
     trajectories,
 )
@@ -76,6 +78,8 @@ class Observed:
     turning
         What a coupling of both links takes from either for each unit, as measured, shape (m, 2)
         [rad/s^2]; None where none is looked for.
+    base_errors
+        What `base` may be off where friction turns; None for nothing.
 
     """
 
@@ -90,35 +94,68 @@ class Observed:
     is_linear: bool = False
     refinement: float = 1.0
     turning: FloatArray | None = None
+    base_errors: BaseErrors | None = None
+
+    @property
+    def unknowns(self) -> int:
+        """Return how many unknowns a segment has of its own: its start, errors of the base."""
+        return STATES + (0 if self.base_errors is None else self.base_errors.nodes.shape[1])
 
 
 def first_starts(observed: Observed) -> FloatArray:
-    """Return measured states at the starts of the segments, shape (segments, 4)."""
+    """Return measured states at the starts of the segments, no error, (segments, unknowns)."""
     first = [segment.first for segment in observed.segments]
-    return np.hstack((observed.angles[first], observed.rates[first]))
+    measured = np.hstack((observed.angles[first], observed.rates[first]))
+    return with_unknowns(observed, measured)
 
 
-def blocks(segments: Sequence[Segment]) -> Iterator[tuple[int, Sequence[Segment]]]:
-    """Yield segments that are simulated side by side, each time with the index of the first."""
-    for first in range(0, len(segments), BLOCK):
-        yield first, segments[first : first + BLOCK]
+def with_unknowns(observed: Observed, starts: FloatArray) -> FloatArray:
+    """Return starts (segments, 4 or more) with no error of the base, (segments, unknowns)."""
+    found = np.zeros((len(starts), observed.unknowns))
+    found[:, :STATES] = starts[:, :STATES]
+    return found
+
+
+def blocks(observed: Observed) -> Iterator[slice]:
+    """Yield the segments that are simulated side by side."""
+    for first in range(0, len(observed.segments), BLOCK):
+        yield slice(first, first + BLOCK)
 
 
 def seen_of(
-    observed: Observed, block: Sequence[Segment], models: FloatArray, starts: FloatArray
+    observed: Observed, block: slice, models: FloatArray, unknowns: FloatArray
 ) -> list[FloatArray]:
-    """Return for each segment what the sensors would show of every model, (m, models, 2) [rad]."""
-    t = observed.times
-    begins = t[[segment.first for segment in block]]
-    longest = max(float(t[s.last - 1] - t[s.first]) for s in block)
+    """
+    Return for each segment what the sensors would show of every model, (m, models, 2) [rad].
+
+    Parameters
+    ----------
+    observed
+        What was measured.
+    block
+        The segments to simulate.
+    models
+        Parameters in the order of `last_links.NAMES`, shape (models, 8).
+    unknowns
+        Starts, and what the base is off, shape (models, 4 or `observed.unknowns`, segments).
+
+    """
+    t, segments = observed.times, observed.segments[block]
+    begins = t[[segment.first for segment in segments]]
+    longest = max(float(t[s.last - 1] - t[s.first]) for s in segments)
     step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
     steps = int(np.ceil(longest / step)) + 1
-    elapsed = [t[s.first : s.last] - begin for s, begin in zip(block, begins, strict=True)]
+    elapsed = [t[s.first : s.last] - begin for s, begin in zip(segments, begins, strict=True)]
     seen = [np.empty((each.size, len(models), CHANNELS)) for each in elapsed]
+    starts = unknowns[:, :STATES]
     for first in range(0, steps, CHUNK):
         last = min(first + CHUNK, steps)
         grid = begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
-        states = trajectories(models, starts, _forcing(observed, models, grid, step))
+        forcing = _forcing(observed, models, grid, step)
+        if observed.base_errors is not None and unknowns.shape[1] > STATES:
+            errors = observed.base_errors.of(block).at(grid, unknowns[:, STATES:])
+            forcing = forcing._replace(base=forcing.base + errors)
+        states = trajectories(models, starts, forcing)
         starts = states[-1]
         for number, angles in enumerate(seen):
             inside = slice(*np.searchsorted(elapsed[number] / step, (first, last)))
@@ -151,4 +188,4 @@ def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: flo
     if observed.turning is not None and models.shape[1] > IMBALANCE:
         each = [between(observed.times, column, grid) for column in observed.turning.T]
         turning = np.stack(each, axis=1)
-    return Forcing(step, effort, variant, base, turning)
+    return Forcing(step, effort, variant, base[:, None, :], turning)

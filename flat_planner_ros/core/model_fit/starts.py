@@ -25,9 +25,7 @@ from collections.abc import Sequence
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.last_links import STATES
 from flat_planner_ros.core.model_fit.refinement import DIFFERENCE
-from flat_planner_ros.core.model_fit.signals import Segment
 from flat_planner_ros.core.model_fit.simulation import (
-    BLOCK,
     blocks,
     first_starts,
     Observed,
@@ -70,10 +68,7 @@ def settled(
 
     """
     begin = np.stack((*places(observed), *known), axis=1)
-    found = [
-        _settled(observed, block, model, spread, begin[first : first + BLOCK])
-        for first, block in blocks(observed.segments)
-    ]
+    found = [_settled(observed, block, model, spread, begin[block]) for block in blocks(observed)]
     return np.concatenate(found)
 
 
@@ -89,7 +84,7 @@ def places(observed: Observed) -> Sequence[FloatArray]:
 
 def _settled(
     observed: Observed,
-    block: Sequence[Segment],
+    block: slice,
     model: FloatArray,
     spread: FloatArray,
     begin: FloatArray,
@@ -117,7 +112,7 @@ def _settled(
 
 def _around(
     observed: Observed,
-    block: Sequence[Segment],
+    block: slice,
     model: FloatArray,
     spread: FloatArray,
     starts: FloatArray,
@@ -127,11 +122,11 @@ def _around(
     nudges = np.vstack((np.zeros(STATES), DIFFERENCE * np.eye(STATES)))
     begun = starts[:, :, None] + nudges
     models = np.tile(model, (count * len(nudges), 1))
-    seen = seen_of(
-        observed, block, models, begun.reshape(len(block), -1, STATES).transpose(1, 2, 0)
-    )
+    begun = begun.reshape(len(starts), -1, STATES).transpose(1, 2, 0)
+    seen = seen_of(observed, block, models, begun)
+    segments = observed.segments[block]
     costs, slopes, gradients = np.empty(starts.shape[:2]), [], []
-    for number, (segment, angles) in enumerate(zip(block, seen, strict=True)):
+    for number, (segment, angles) in enumerate(zip(segments, seen, strict=True)):
         misfit = (angles - observed.angles[segment.first : segment.last, None]) / spread
         each = misfit.reshape(len(angles), count, len(nudges), -1).transpose(1, 2, 0, 3)
         flat = each.reshape(count, len(nudges), -1)

@@ -1,0 +1,163 @@
+# Copyright 2026 flat_planner_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Errors of the velocity of link n-2, where they turn the friction of joint n-1.
+
+That velocity comes from noisy angles of n-2 encoders. Where joint n-1 turns back, its error
+changes when friction does so, and link n-1 goes on faster or slower from there. So the errors are
+unknowns beside the starts of the segments, of as much covariance as the noise gives them.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray
+from flat_planner_ros.core.model_fit.signals import derivatives, Segment
+import numpy as np
+
+NODES = 4
+"""Nodes over the time that smoothing polynomials span: as fast as their errors change [-]."""
+
+TURNING = 4.0
+"""Velocity of joint n-1 up to which friction may turn, in those of Coulomb friction [-]."""
+
+BIASED = 2.0
+"""Change with a longer span that noise does not explain, in its own standard deviations [-]."""
+
+
+class BaseErrors(NamedTuple):
+    """
+    Errors of a velocity between nodes, straight, and nothing far from them.
+
+    Attributes
+    ----------
+    nodes
+        Times for each segment, infinite beyond those that it has, shape (segments, K) [s].
+    roots
+        Their covariance is that times its transpose, shape (segments, K, K) [rad/s].
+    spacing
+        Of neighbouring nodes [s].
+
+    """
+
+    nodes: FloatArray
+    roots: FloatArray
+    spacing: float
+
+    def of(self, block: slice) -> 'BaseErrors':
+        """Return those of some of the segments."""
+        return BaseErrors(self.nodes[block], self.roots[block], self.spacing)
+
+    def at(self, grid: FloatArray, units: FloatArray) -> FloatArray:
+        """
+        Return the errors of the velocity.
+
+        Parameters
+        ----------
+        grid
+            Times, shape (g, segments) [s].
+        units
+            Unknowns of unit covariance, shape (models, K, segments) [-].
+
+        Returns
+        -------
+        FloatArray
+            Shape (g, models, segments) [rad/s].
+
+        """
+        away = np.abs(grid.T[:, :, None] - self.nodes[:, None, :]) / self.spacing
+        errors = self.roots @ units.transpose(2, 1, 0)
+        found: FloatArray = np.maximum(1.0 - away, 0.0) @ errors
+        return found.transpose(1, 2, 0)
+
+
+class Smoothing(NamedTuple):
+    """How a velocity was smoothed: noise of the angle [rad], and the polynomials' span [s]."""
+
+    noise: float
+    span: float
+
+
+def base_errors_of(
+    times: FloatArray,
+    turning: FloatArray,
+    change: FloatArray,
+    segments: Sequence[Segment],
+    smoothing: tuple[Smoothing, Smoothing],
+) -> BaseErrors | None:
+    """
+    Return what is to be expected of the velocity's errors; None if friction never turns.
+
+    Parameters
+    ----------
+    times
+        Shape (m,) [s].
+    turning
+        Velocity of joint n-1, shape (m,) [rad/s].
+    change
+        Of the velocity of link n-2 with the longer span, shape (m,) [rad/s].
+    segments
+        Pieces with errors of their own.
+    smoothing
+        Of the velocity, and the one with a longer span.
+
+    """
+    period = float(np.median(np.diff(times)))
+    spacing = smoothing[0].span / NODES
+    nodes = [_nodes(times[slice(*each)], turning[slice(*each)], spacing) for each in segments]
+    most = max(each.size for each in nodes)
+    if not most:
+        return None
+    lags, covariance, changing = _covariances(period, *smoothing)
+    places, roots = np.full((len(nodes), most), np.inf), np.zeros((len(nodes), most, most))
+    for own, place, root in zip(nodes, places, roots, strict=True):
+        bias = np.maximum(np.interp(own, times, change) ** 2 - BIASED**2 * changing, 0.0)
+        longer = smoothing[1].span / smoothing[0].span - 1.0
+        of_noise = np.interp(own[:, None] - own, lags, covariance)
+        place[: own.size] = own
+        root[: own.size, : own.size] = _root(of_noise + np.diag(bias / longer**2))
+    return BaseErrors(places, roots, spacing)
+
+
+def _nodes(times: FloatArray, turning: FloatArray, spacing: float) -> FloatArray:
+    """Return nodes around all samples at which friction may turn [s]."""
+    slow = times[np.abs(turning) < TURNING * COULOMB_VELOCITY]
+    nodes = np.arange(times[0], times[-1] + spacing, spacing)
+    if not slow.size:
+        return nodes[:0]
+    after = np.clip(np.searchsorted(slow, nodes), 0, slow.size - 1)
+    around = np.stack((slow[after], slow[np.maximum(after - 1, 0)]))
+    near: FloatArray = nodes[np.abs(around - nodes).min(axis=0) <= spacing]
+    return near
+
+
+def _covariances(
+    period: float, smoothing: Smoothing, longer: Smoothing
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return lags [s], a velocity's autocovariance, and the variance of its change by a span."""
+    half = round(longer.span / period) + NODES
+    impulse = np.zeros((2 * half + 1, 1))
+    impulse[half] = smoothing.noise
+    times = np.linspace(0.0, 2 * half * period, impulse.size)
+    own, other = (derivatives(times, impulse, s.span)[1][:, 0] for s in (smoothing, longer))
+    lags = np.linspace(-times[-1], times[-1], 2 * own.size - 1)
+    return lags, np.correlate(own, own, mode='full'), float(np.sum((other - own) ** 2))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Return a square root of a covariance that may be singular."""
+    variances, directions = np.linalg.eigh(covariance)
+    root: FloatArray = directions * np.sqrt(np.maximum(variances, 0.0))
+    return root
