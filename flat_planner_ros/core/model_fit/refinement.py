@@ -178,17 +178,23 @@ def _projected(
     spread: FloatArray,
 ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
     """Return weighted misfit and slopes without a segment's own unknowns, and their correction."""
-    own, count = by_own.shape[-1], by_parameter.shape[-1]
+    size, own = misfit.size, by_own.shape[-1]
+    slopes = (by_own / spread[:, None]).reshape(size, own)
+    columns = (by_parameter / spread[:, None]).reshape(size, by_parameter.shape[-1])
+    whole = np.column_stack(((misfit / spread).ravel(), columns))
+    basis, triangle = np.linalg.qr(slopes[:, :STATES])
+    inside, crossed = basis.T @ whole, basis.T @ slopes[:, STATES:]
+    whole -= basis @ inside
+    by_errors = slopes[:, STATES:] - basis @ crossed
     # What is expected of the base's errors counts as if each had been measured to be zero.
-    weighted = np.append(misfit / spread, errors)
-    slopes = np.vstack(((by_own / spread[:, None]).reshape(-1, own), np.eye(own)[STATES:]))
-    columns = np.zeros((weighted.size, count))
-    columns[: misfit.size] = (by_parameter / spread[:, None]).reshape(misfit.size, count)
-    basis, triangle = np.linalg.qr(slopes)
-    inside, inside_columns = basis.T @ weighted, basis.T @ columns
-    solved = np.linalg.solve(triangle, np.column_stack((inside, inside_columns)))
-    correction = -solved[:, 0], -solved[:, 1:]
-    return weighted - basis @ inside, columns - basis @ inside_columns, correction
+    expected = np.zeros((own - STATES, whole.shape[1]))
+    expected[:, 0] = errors
+    normal = by_errors.T @ by_errors + np.eye(own - STATES)
+    moved = -np.linalg.solve(normal, by_errors.T @ whole + expected)
+    started = -np.linalg.solve(triangle, inside + crossed @ moved)
+    left = np.vstack((whole + by_errors @ moved, expected + moved))
+    correction = np.vstack((started, moved))
+    return left[:, 0], left[:, 1:], (correction[:, 0], correction[:, 1:])
 
 
 def _alike(columns: FloatArray, moves: npt.NDArray[np.bool_]) -> FloatArray:
