@@ -17,7 +17,8 @@ Errors of the velocity of link n-2, where they turn the friction of joint n-1.
 
 That velocity comes from noisy angles of n-2 encoders. Where joint n-1 turns back, its error
 changes when friction does so, and link n-1 goes on faster or slower from there. So the errors are
-unknowns beside the starts of the segments, of as much covariance as the noise gives them.
+unknowns beside the starts of the segments, of as much covariance as the noise gives them ((N8a) of
+docs/derivation.md).
 """
 
 from collections.abc import Sequence

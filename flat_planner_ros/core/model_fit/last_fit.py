@@ -95,8 +95,8 @@ class LastFit(NamedTuple):
     imbalance
         Of the last link; None where it was not looked for, or nothing tells it.
     by_inputs
-        What the effort between samples and its time, the integration and the noise of the velocity
-        of link n-2 may do to either angle that no parameter takes away, shape (2,) [rad].
+        What the effort between samples and its time, and the integration may do to either angle
+        that no parameter takes away, shape (2,) [rad].
 
     """
 

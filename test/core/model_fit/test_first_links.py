@@ -14,6 +14,7 @@
 
 """The first links of longer arms: what tells them, how well, and what does not."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from flat_planner_ros.core.arm import PlanarArm
@@ -27,6 +28,7 @@ from flat_planner_ros.core.model_fit.first_links import (
     rows,
 )
 from flat_planner_ros.core.model_fit.weak_form import Windows
+from free_arm import carried
 import numpy as np
 import pytest
 from random_cases import cases
@@ -168,6 +170,33 @@ def test_a_missing_friction_is_said_where_the_first_links_have_another():
     braked = Measurements(times=seen.times, positions=seen.positions, efforts=efforts)
     assert 'N m at link 1' in directly(braked, true, true)[1]
     assert directly(seen, believed, true)[1] == ''
+
+
+@pytest.mark.parametrize('backlash', [0.0, 0.005], ids=['as modelled', 'backlash of 5 mrad'])
+def test_five_joints_tell_the_last_two_as_well_as_two_do(backlash):
+    """Noise of three encoders at the base is no misfit, and what else is wrong stays one."""
+    believed, true = arms(3, EARTH, seed=1)
+    short = {'goals': GOALS[:2], 'until': 3.1}
+    clean = held(true, believed, **short)
+    if backlash:
+
+        def spring(q, rate):
+            pulled = q - np.clip(q, -backlash, backlash)
+            return true.stiffness * pulled + true.damping * rate
+
+        clean = carried(clean, true, spring=spring)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(clean.positions.shape)
+    fit = fit_model(replace(clean, positions=clean.positions + noise), believed)
+    if backlash:
+        assert 'passive joint' in fit.misfit
+        return
+    assert fit.misfit == ''
+    last = [*true.inertia_star, true.stiffness, true.damping]
+    friction = [true.viscous_friction[-1], true.coulomb_friction[-1]]
+    found = fit.estimates[:6]
+    assert [each.value for each in found] == pytest.approx(last + friction, rel=0.005)
+    for each, value in zip(found, last + friction, strict=True):
+        assert abs(each.value - value) < 4.0 * each.std, each.name
 
 
 @pytest.mark.parametrize('count', [1, 2, 3, 5])
