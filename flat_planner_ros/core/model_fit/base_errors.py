@@ -22,17 +22,22 @@ docs/derivation.md).
 """
 
 from collections.abc import Sequence
+from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray
 from flat_planner_ros.core.model_fit.signals import derivatives, Segment
 import numpy as np
+import numpy.typing as npt
 
 NODES = 4
 """Nodes over the time that smoothing polynomials span: as fast as their errors change [-]."""
 
 TURNING = 4.0
 """Velocity of joint n-1 up to which friction may turn, in those of Coulomb friction [-]."""
+
+SEEN = 2.0
+"""Standard deviations by which a velocity may be seen off [-]."""
 
 BIASED = 2.0
 """Change with a longer span that noise does not explain, in its own standard deviations [-]."""
@@ -117,11 +122,14 @@ def base_errors_of(
     """
     period = float(np.median(np.diff(times)))
     spacing = smoothing[0].span / NODES
-    nodes = [_nodes(times[slice(*each)], turning[slice(*each)], spacing) for each in segments]
+    lags, covariance, changing = _covariances(period, *smoothing)
+    # What is measured of joint n-1 errs as much.
+    bound = TURNING * COULOMB_VELOCITY + SEEN * sqrt(float(covariance.max()))
+    slow = np.abs(turning) < bound
+    nodes = [_nodes(times[slice(*each)], slow[slice(*each)], spacing) for each in segments]
     most = max(each.size for each in nodes)
     if not most:
         return None
-    lags, covariance, changing = _covariances(period, *smoothing)
     places, roots = np.full((len(nodes), most), np.inf), np.zeros((len(nodes), most, most))
     for own, place, root in zip(nodes, places, roots, strict=True):
         bias = np.maximum(np.interp(own, times, change) ** 2 - BIASED**2 * changing, 0.0)
@@ -132,9 +140,9 @@ def base_errors_of(
     return BaseErrors(places, roots, spacing)
 
 
-def _nodes(times: FloatArray, turning: FloatArray, spacing: float) -> FloatArray:
+def _nodes(times: FloatArray, is_slow: npt.NDArray[np.bool_], spacing: float) -> FloatArray:
     """Return nodes around all samples at which friction may turn [s]."""
-    slow = times[np.abs(turning) < TURNING * COULOMB_VELOCITY]
+    slow = times[is_slow]
     nodes = np.arange(times[0], times[-1] + spacing, spacing)
     if not slow.size:
         return nodes[:0]
