@@ -115,10 +115,11 @@ class Network:
                 program.kill()
 
     def _program(self, command, environment, **options):
-        """Start a program that is spoken to."""
+        """Start a program that is spoken to, with the middleware's profile only if it is given."""
+        bare = {name: text for name, text in os.environ.items() if name not in VARIABLES}
         return subprocess.Popen(
             command,
-            env={**os.environ, **environment},
+            env={**bare, **environment},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

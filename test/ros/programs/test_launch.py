@@ -23,6 +23,7 @@ import sys
 from time import monotonic
 
 from flat_planner_ros.figures.paper_example import SCENARIOS
+from flat_planner_ros.ros.dds_profile import VARIABLES
 import pytest
 import yaml
 
@@ -39,16 +40,13 @@ VIEWERS = {
 DEADLINE = 60.0
 """Time in which all programs must have been started, on a busy machine [s]."""
 
-PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
-"""Environment variable that names profiles of Fast DDS."""
-
 STAND_IN = f"""#!{sys.executable}
 import os, pathlib, signal, sys, yaml
 files = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == '--params-file']
 contents = [yaml.safe_load(pathlib.Path(file).read_text()) for file in files]
 name = next((a[8:] for a in sys.argv if a.startswith('__node:=')), pathlib.Path(sys.argv[0]).name)
 path = pathlib.Path(RECORDS) / name
-profiles = os.environ.get('{PROFILES}', '')
+profiles = os.environ.get('{VARIABLES[0]}', '')
 path.with_suffix('.tmp').write_text(yaml.dump([sys.argv[1:], contents, profiles]))
 path.with_suffix('.tmp').rename(path)
 signal.sigwait([signal.SIGINT, signal.SIGTERM])
@@ -84,8 +82,9 @@ class Launched:
         """Return the arguments and parameter files of programs, by the names of their nodes."""
         command = [sys.executable, '-c', ROS2, 'launch', str(LAUNCH / file), *arguments]
         prefixes = [str(self.prefix), os.environ.get('AMENT_PREFIX_PATH', '')]
+        inherited = {name: text for name, text in os.environ.items() if name not in VARIABLES}
         environment = {
-            **os.environ,
+            **inherited,
             'AMENT_PREFIX_PATH': os.pathsep.join(prefixes),
             'PYTHONPATH': str(CHECKOUT),
             'ROS_LOG_DIR': str(self.records / 'log'),
