@@ -21,8 +21,11 @@ from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 import numpy as np
 import pytest
 from ros.conftest import TIMEOUT
-from ros.rig import COMMAND, Rig, stamp, START_DELAY
+from ros.rig import COMMAND, Rig, stamp
 from std_msgs.msg import Float64MultiArray
+
+START_DELAY = 1.0
+"""From a verdict to the motion [s]; a tracker that has just started hears the arm by then."""
 
 EFFORTS = '/flat_tracker/effort_commands'
 ELDER = 'another tracker moves this arm and was started before'
