@@ -275,6 +275,6 @@ def _force(
         rows[1:, :, :STATES] += turned
         rows[1:, :, STATES:] += stages @ turned
         rows[:-1, :, STATES + 2] += turned[:, :, 2]
-    past = np.concatenate((base, np.zeros((2, base.shape[1]))))
-    rows[:, :, STATES:] -= np.stack((past[:-2:2], past[1:-1:2], past[2::2]), axis=1)[:, None]
+    past = np.concatenate((base, np.zeros((2, *base.shape[1:]))))
+    rows[:, :, STATES:] -= np.stack((past[:-2:2], past[1:-1:2], past[2::2]), axis=2)
     rows[:, :, STATES:] /= COULOMB_VELOCITY
