@@ -22,6 +22,7 @@ from pathlib import Path
 
 from flat_planner_ros.core.arm import FlatPlannerError, InvalidRequest, SampleTable
 from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.core.monitor import FeedbackTimes
 from flat_planner_ros.ros.recording.csv_table import csv_samples, SUFFIXES
 from flat_planner_ros.ros.recording.recent_samples import (
     joined,
@@ -32,10 +33,11 @@ from flat_planner_ros.ros.recording.recent_samples import (
 from flat_planner_ros.ros.recording.recording import Recording
 from flat_planner_ros.ros.recording.replay import find_topic, JOINT_STATE, stretches
 from flat_planner_ros.ros.recording.storage import Entry
-from flat_planner_ros.ros.wire.interfaces import JOINT_STATES
+from flat_planner_ros.ros.wire.interfaces import DIAGNOSTICS, JOINT_STATES
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 from flat_planner_ros.ros.wire.state_table import read_states
+from flat_planner_ros.ros.wire.tracker_word import hear_tracker
 import numpy as np
 
 APART = 10.0
@@ -57,6 +59,8 @@ def measured(
     """
     Return what recordings show of an arm, one after the other with a gap between them.
 
+    Efforts count as held if a tracker acted in one of them: a table does not say so.
+
     Parameters
     ----------
     paths
@@ -77,12 +81,16 @@ def measured(
 
     """
     parts: list[SampleTable] = []
+    are_held = False
     for path in paths:
         if path.suffix.lower() in SUFFIXES:
             samples = csv_samples(path, joints)
             advance(1.0)
         else:
-            samples = _samples(Recording(path, advance), joints, namespace, topic)
+            feedback = FeedbackTimes()
+            samples = _samples(Recording(path, advance), joints, namespace, topic, feedback)
+            stamps = samples.times
+            are_held |= bool(len(stamps)) and feedback.has_acted(stamps[0], stamps[-1])
         if not len(samples):
             raise NothingMeasured(
                 f'{path} has no joint states of {", ".join(joints)} with efforts: the driver must '
@@ -93,17 +101,30 @@ def measured(
         parts.append(replace(samples, times=samples.times - samples.times[0] + begin))
     whole = joined(parts)
     efforts = np.empty_like(whole.positions) if whole.efforts is None else whole.efforts
-    return Measurements(times=whole.times, positions=whole.positions, efforts=efforts[:, :-1])
+    return Measurements(
+        times=whole.times,
+        positions=whole.positions,
+        efforts=efforts[:, :-1],
+        are_held=are_held,
+    )
 
 
 def _samples(
-    recording: Recording, joints: Sequence[str], namespace: str, topic: str
+    recording: Recording,
+    joints: Sequence[str],
+    namespace: str,
+    topic: str,
+    feedback: FeedbackTimes,
 ) -> SampleTable:
-    """Return the complete samples of a recording in the order of their stamps."""
+    """Return the complete samples in the order of their stamps; note when a tracker acted."""
     name = find_topic(recording, JOINT_STATE, topic, namespace, JOINT_STATES, '--joint-states')
     reader = JointStateReader(joints)
     parts = [with_efforts(nothing(len(joints)))]
-    for entries in stretches(recording.batches({name})):
+    home = f'/{namespace.strip("/")}' if namespace else name.rpartition('/')[0]
+    for entries in stretches(recording.batches({name, DIAGNOSTICS})):
+        if entries[0].topic == DIAGNOSTICS:
+            _hear(recording, entries, home, feedback)
+            continue
         states = read_states([entry.message for entry in entries])
         table = None if states is None else reader.read_table(*states)
         found = _read_singly(recording, reader, entries) if table is None else [table]
@@ -115,6 +136,16 @@ def _samples(
     latest = np.maximum.accumulate(samples.times)
     is_later = np.append(True, samples.times[1:] > latest[:-1])[: len(samples)]
     return samples.rows(np.flatnonzero(is_later))
+
+
+def _hear(
+    recording: Recording, entries: Sequence[Entry], namespace: str, feedback: FeedbackTimes
+) -> None:
+    """Note when a namespace's tracker acted."""
+    for entry in entries:
+        msg = recording.read(entry)
+        if msg is not None:
+            hear_tracker(msg, namespace, feedback)
 
 
 def _read_singly(

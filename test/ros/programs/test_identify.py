@@ -18,12 +18,14 @@ from array import array
 from dataclasses import replace
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.model_fit import Measurements
 from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.wire import stamps
+from flat_planner_ros.ros.wire.interfaces import DIAGNOSTICS, TRACKER_NAME
 from flat_planner_ros.ros.wire.message_types import definition
 import numpy as np
 import pytest
@@ -42,6 +44,7 @@ from flat_planner_ros.ros.recording.recording import RecordingWriter  # noqa: E4
 
 SHIPPED = Path(__file__).resolve().parents[3] / 'config' / 'arm_2dof.yaml'
 KIND = 'sensor_msgs/msg/JointState'
+NEWS = 'diagnostic_msgs/msg/DiagnosticArray'
 BEGUN = 1000.0
 """Time of the first sample [s]."""
 
@@ -51,10 +54,17 @@ TRUE = PlanarArm.reduced(
 )
 
 
-def write(path: Path, *, with_efforts: bool = True) -> None:
-    """Write a recording of four goals, with the spring's effort as drivers report it."""
-    seen = recorded(TRUE, BELIEVED, noise=1e-5)
+def write(path: Path, *, with_efforts: bool = True, tracker: str = '', until: float = 6.2) -> None:
+    """Write a recording of goals, with the spring's effort as drivers report it."""
+    seen = recorded(TRUE, BELIEVED, noise=1e-5, until=until)
     writer = RecordingWriter(path)
+    if tracker:
+        writer.add_topic(DIAGNOSTICS, NEWS, definition(NEWS), [])
+        word = DiagnosticStatus(name=TRACKER_NAME, hardware_id=tracker)
+        word.values = [KeyValue(key='phase', value='tracking')]
+        msg = DiagnosticArray(status=[word])
+        msg.header.stamp = stamps.time_msg(BEGUN + 0.1)
+        writer.write(DIAGNOSTICS, int((BEGUN + 0.1) * 1e9), serialize_message(msg))
     writer.add_topic('/joint_states', KIND, definition(KIND), [QoSProfile(depth=10)])
     for time, angles, efforts in zip(seen.times, seen.positions, seen.efforts, strict=True):
         msg = JointState(name=['joint2', 'joint1'], position=array('d', angles[::-1]))
@@ -87,6 +97,20 @@ def test_a_recording_becomes_a_parameter_file(tmp_path, capsys):
     assert f'# {printed.splitlines()[0]}' in text
     assert scale(0.87) not in text
     assert MATCHES in text
+
+
+def test_efforts_of_a_tracked_arm_are_held(tmp_path):
+    """Another arm's tracker is none."""
+    joints = 'joint1', 'joint2'
+    for tracker, is_tracked in (
+        ('/flat_tracker', True),
+        ('/arm2/flat_tracker', False),
+        ('', False),
+    ):
+        bag = tmp_path / f'{is_tracked}{len(tracker)}.mcap'
+        write(bag, tracker=tracker, until=1.0)
+        assert measured([bag], joints).are_held == is_tracked
+    assert measured([bag, *tmp_path.glob('True*')], joints).are_held
 
 
 def test_a_trusted_inertia_is_kept(tmp_path, capsys):
