@@ -194,8 +194,8 @@ class DrivenMode:
         hats = np.full(pieces + 1, after + before)
         hats[0], hats[-1] = after, before
         left = duration - step * np.arange(pieces + 1.0)
-        row: ComplexArray = self.swing_gain * step * hats * np.exp(pole * left)
-        return row
+        turned: ComplexArray = np.exp(pole * left)
+        return self.swing_gain * step * hats * turned
 
     def states(self, start: ModeState, drive: FloatArray, duration: float) -> ModeState:
         """

@@ -159,7 +159,7 @@ def links_state(reference: Reference) -> FloatArray:
     return np.concatenate([links_of(reference.positions), links_of(reference.velocities)])[:, 0]
 
 
-def feed_forward(chain: Chain, links: FloatArray, acceleration: FloatArray) -> FloatArray:
+def feed_forward(chain: Chain, links: FloatArray, acceleration: float | FloatArray) -> FloatArray:
     """
     Return the effort of joint n-1 that a planned motion takes [N m].
 

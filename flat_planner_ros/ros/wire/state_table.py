@@ -68,8 +68,8 @@ def read_states(messages: Sequence[bytes]) -> StateTable | None:
         places = front.numbers(ARRAYS)
     except Unusual:
         return None
-    table = np.frombuffer(bytearray().join(messages), np.uint8)
-    table = table.reshape(len(messages), len(first))
+    numbers = np.frombuffer(bytearray().join(messages), np.uint8)
+    table = numbers.reshape(len(messages), len(first))
     for gap in front.padding:
         table[:, gap] = 0
     if places[0][1] != len(names) or not _is_one_form(table, places):
