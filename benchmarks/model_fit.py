@@ -15,8 +15,9 @@
 """How near a fitted model comes to random arms, and how honest its standard errors are."""
 
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from math import pi
 from multiprocessing import get_context
 from pathlib import Path
@@ -26,7 +27,7 @@ from time import process_time
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, PlanarArm
-from flat_planner_ros.core.model_fit import fit_model, Measurements
+from flat_planner_ros.core.model_fit import fit_model, Measurements, NAMES
 from measurement import Section
 import numpy as np
 from structures import play, STRUCTURES
@@ -53,8 +54,11 @@ UNTIL = 6.2
 STRUCTURE_RATE, STRUCTURE_NOISE = 200.0, (0.0, 1e-4, 1e-3)
 """Rate [Hz] and noise [rad] with which other structures are looked at."""
 
-STRUCTURE_SHARE = 0.1
-"""Arms of each structure, relative to those of each kind of sensor [-]."""
+STRUCTURE_SHARE = 0.02
+"""Arms of each structure, relative to those of all kinds of sensors together [-]."""
+
+WITHIN = 2.0
+"""Standard errors within which the true value is looked for [-]."""
 
 OFF = (0.1, 0.3)
 """How far each parameter of the plant is from the model [-]."""
@@ -64,16 +68,21 @@ GOALS = 4
 
 
 def sections(options: Namespace) -> Iterator[Section]:
-    """Yield the tables for as many random arms as are asked for."""
-    cases = max(1, options.arms)
+    """Yield the tables for as many random arms as are asked for, each with one recording."""
+    cases = max(len(SENSORS), options.arms)
     with ProcessPoolExecutor(options.processes, mp_context=get_context('spawn')) as pool:
-        rows = [_row(sensors, bound, cases, pool) for sensors, bound in SENSORS.items()]
+        found = [
+            list(pool.map(_case, repeat(sensors), range(place, cases, len(SENSORS))))
+            for place, sensors in enumerate(SENSORS)
+        ]
+        rows = [_row(*kind, each) for kind, each in zip(SENSORS.items(), found, strict=True)]
         header = (
             *('rate, noise, encoder', 'median error', '90 %', 'goal', 'within the goal'),
             *('within 2 std', 'misfit said', f'CPU for {UNTIL:g} s'),
         )
         title = f'Model fit: worst of six parameters, {cases} random arms 10 to 30 % off'
         yield Section(title, header, rows)
+        yield Section('Model fit: how honest standard errors are', *_honesty(found))
         few = max(1, round(STRUCTURE_SHARE * cases))
         header = 'arm, noise', 'said not to be the model', 'largest error where not said'
         title = f'Model fit: other structures, {few} random arms'
@@ -83,13 +92,12 @@ def sections(options: Namespace) -> Iterator[Section]:
 
 
 def _row(
-    sensors: tuple[float, float, int], bound: float, cases: int, pool: ProcessPoolExecutor
+    sensors: tuple[float, float, int], bound: float, found: Sequence['_Found']
 ) -> tuple[object, ...]:
     """Return what comes of one kind of sensor."""
     rate, noise, bits = sensors
-    found = list(pool.map(_case, [sensors] * cases, range(cases)))
     errors = np.array([each.worst for each in found])
-    inside = np.concatenate([each.inside for each in found])
+    inside = np.concatenate([np.abs(each.ratios) < WITHIN for each in found])
     return (
         f'{rate:g} Hz, {noise:g} rad, {bits} bit',
         f'{100 * np.median(errors):.2g} %',
@@ -97,16 +105,29 @@ def _row(
         f'{100 * bound:g} %',
         f'{100 * np.mean(errors <= bound):.0f} %',
         f'{100 * np.mean(inside):.0f} %',
-        f'{sum(each.is_misfit for each in found)} of {cases}',
+        f'{sum(each.is_misfit for each in found)} of {len(found)}',
         f'{np.mean([each.spent for each in found]):.1f} s',
     )
 
 
+def _honesty(found: Sequence[Sequence['_Found']]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows: how often either parameter is within 2 std, and all of them."""
+    ratios = np.abs(np.concatenate([[each.ratios for each in kind] for kind in found]))
+    told = (*NAMES[: ratios.shape[1]], 'all')
+    inside = [*(ratios < WITHIN).mean(axis=0), (ratios < WITHIN).mean()]
+    middle = [*np.median(ratios, axis=0), np.median(ratios)]
+    rows = [
+        (name, f'{100 * share:.1f} %', f'{half:.2f}')
+        for name, share, half in zip(told, inside, middle, strict=True)
+    ]
+    return ('parameter', 'within 2 std', 'median error / std (0.67 if normal)'), rows
+
+
 class _Found(NamedTuple):
-    """Worst relative error, which of the six are within 2 std, doubt, and time [s]."""
+    """Worst relative error, the six errors in standard errors, doubt, and time [s]."""
 
     worst: float
-    inside: np.ndarray
+    ratios: np.ndarray
     is_misfit: bool
     spent: float
 
@@ -121,9 +142,9 @@ def _case(sensors: tuple[float, float, int], case: int) -> _Found:
     fit = fit_model(seen, believed)
     spent = process_time() - begun
     found = np.array([(e.value, e.std) for e in fit.estimates[:6]])
-    errors = np.abs(found[:, 0] - _six(true))
-    worst = float((errors / _six(true)).max())
-    return _Found(worst, errors < 2 * found[:, 1], bool(fit.misfit), spent)
+    errors = found[:, 0] - _six(true)
+    worst = float(np.abs(errors / _six(true)).max())
+    return _Found(worst, errors / found[:, 1], bool(fit.misfit), spent)
 
 
 def _lengths() -> Iterator[tuple[object, ...]]:

@@ -96,7 +96,7 @@ def _options() -> Namespace:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument('only', nargs='*', choices=[*BENCHMARKS, []], help='all by default')
     parser.add_argument('--seconds', type=float, default=60.0, help='of each run in real time')
-    parser.add_argument('--arms', type=int, default=50, help='random ones of model_fit')
+    parser.add_argument('--arms', type=int, default=60, help='random ones of model_fit, in all')
     parser.add_argument('--processes', type=int, default=2, help='of model_fit')
     parser.add_argument('--speed', type=float, default=1.0, help='of time in tracking_nodes')
     parser.add_argument('--domain', type=int, default=101, help='ROS domain')

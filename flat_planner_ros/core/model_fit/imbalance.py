@@ -14,9 +14,10 @@
 
 """Imbalance of the last link from the same recording: a coupling that a balanced arm has not."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.doubts import MIDDLE
 from flat_planner_ros.core.model_fit.judgement import covariance
 from flat_planner_ros.core.model_fit.last_links import BOTH, IMBALANCE, LAST, STIFFNESS
 from flat_planner_ros.core.model_fit.refinement import refine, Refined
@@ -103,15 +104,15 @@ def turning_of(deflection: FloatArray, rates: FloatArray, accelerations: FloatAr
 
 
 def find_imbalance(
-    observed: Observed, other: Observed, found: Refined, free: list[int], scales: FloatArray
+    observed: Observed, found: Refined, free: list[int], scales: FloatArray
 ) -> tuple[ImbalanceEstimate | None, Refined, Observed]:
     """
     Return the imbalance that a recording shows, and the fit with it where there is one.
 
     Parameters
     ----------
-    observed, other
-        The recording with one interpolation of the effort, and with the other.
+    observed
+        The recording.
     found, free, scales
         The fit of a balanced arm, what it tells, and the parameters' scales.
 
@@ -139,6 +140,7 @@ def find_imbalance(
     best, tried = observed, tried_with(observed)
     if tried.around.cost < EXPLAINED * found.around.cost:
         # A balanced arm may have been explained by the wrong interpolation.
+        other = replace(observed, straightness=float(observed.straightness < MIDDLE))
         again = tried_with(other)
         if again.around.cost < tried.around.cost:
             best, tried = other, again

@@ -128,7 +128,7 @@ def information(
         moves=np.ones((motion.times.size, CHANNELS), dtype=bool),
         rounding=np.zeros(CHANNELS),
         segments=segments_of(motion.times, period, SEGMENT * _free_period(arm)),
-        is_linear=True,
+        straightness=1.0,
         refinement=refinement,
     )
     model = vector_of(arm)

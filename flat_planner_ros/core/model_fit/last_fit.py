@@ -14,12 +14,20 @@
 
 """The fit of the last two links: a guess, its refinement, what is told, and how well."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from math import pi, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.model_fit.doubts import (
+    Change,
+    change_between,
+    Doubt,
+    errors_of,
+    straighter,
+    straightness,
+)
 from flat_planner_ros.core.model_fit.imbalance import find_imbalance, ImbalanceEstimate
 from flat_planner_ros.core.model_fit.judgement import covariance
 from flat_planner_ros.core.model_fit.last_links import (
@@ -38,17 +46,12 @@ from flat_planner_ros.core.model_fit.observation import (
     noise_of_links,
     observed_of,
     with_base_errors,
-    with_half_the_efforts,
+    with_fewer_efforts,
     with_other_times,
 )
 from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, refine, Refined
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
-from flat_planner_ros.core.model_fit.simulation import (
-    CHANNELS,
-    first_starts,
-    Observed,
-    with_unknowns,
-)
+from flat_planner_ros.core.model_fit.simulation import first_starts, Observed, with_unknowns
 from flat_planner_ros.core.model_fit.starts import settled
 from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
 import numpy as np
@@ -62,11 +65,8 @@ LITTLE = 2.0
 COARSE = 0.3
 """Refinement of the steps for a first fit [-]."""
 
-CLEAR = 9.0
-"""Difference of two sums of squares, in variances, that decides between interpolations [-]."""
-
-UNDECIDED, DECIDED = 0.5, 0.1
-"""Share of the interpolations' difference that stays as a systematic error [-]."""
+FINE = 2.0
+"""Refinement of the steps for the last fit, whose errors are left [-]."""
 
 HELD_TIMES = 4
 """Draws of the unknown times at which held efforts began to act [-]."""
@@ -121,22 +121,53 @@ def fit_last_links(
     if observed.base_errors is not None:
         # Sharper than by what is left without these errors.
         found = found._replace(starts=with_unknowns(observed, found.starts), spread=noise)
-    found, observed, other = _interpolated(observed, found, scales)
+    every = list(range(len(NAMES)))
+    found = refine(observed, found.parameters, every, scales, found.spread, found.starts)
+    found, observed, vague = _interpolated(observed, found, every, scales)
+    observed = replace(observed, refinement=FINE)
     found, free = _told(observed, found, scales, believed)
     imbalance = None
     if with_imbalance:
-        former = observed
-        imbalance, found, observed = find_imbalance(former, other[0], found, free, scales)
-        other = (other[0] if observed is former else former, other[1])
-    doubtful = [_Doubt(other[1], other[0])]
-    # Both are of second order, efforts with corners: twice the step adds three times the error.
-    doubtful.append(_Doubt(1 / 3, replace(observed, refinement=observed.refinement / 2)))
-    doubtful.append(_Doubt(1 / 3, with_half_the_efforts(observed)))
-    if measurements.are_held:
-        draws = (with_other_times(observed, seed) for seed in range(HELD_TIMES))
-        doubtful += [_Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER) for draw in draws]
-    errors, by_inputs = _errors(doubtful, found, free, scales)
+        imbalance, found, observed = find_imbalance(observed, found, free, scales)
+        if imbalance is not None and imbalance.is_seen:
+            found, observed, vague = _interpolated(observed, found, free, scales)
+    doubts = _doubts(observed, found, free, scales, vague, measurements.are_held)
+    errors, by_inputs = errors_of(doubts, found, free, scales)
     return LastFit(observed, found, free, errors, imbalance, by_inputs)
+
+
+def _doubts(
+    observed: Observed,
+    found: Refined,
+    free: list[int],
+    scales: FloatArray,
+    vague: float,
+    are_held: bool,
+) -> Iterator[Doubt]:
+    """Yield what may be wrong with inputs and integration, `vague` being the straightness."""
+
+    def around(changed: Observed) -> Linearisation:
+        return linearised(changed, found.parameters, found.starts, free, scales, found.spread)
+
+    def change(changed: Observed) -> Change:
+        return change_between(plain, around(changed), found.spread)
+
+    # Longer steps do for differences.
+    observed = replace(observed, refinement=observed.refinement / 2)
+    plain = around(observed)
+    # Of second order where efforts have corners: twice the step adds three times the error.
+    yield Doubt(1 / 3, change_between(found.around, plain, found.spread))
+    straight = change(straighter(observed))
+    yield Doubt(vague, straight)
+    half, quarter = (
+        change(with_fewer_efforts(observed, every)).besides(straight) for every in (2, 4)
+    )
+    weight = 1.0 / (quarter.growth_from(half) - 1.0)
+    yield Doubt(weight, half, 1 / 3 / weight)
+    if are_held:
+        for seed in range(HELD_TIMES):
+            draw = change(with_other_times(observed, seed))
+            yield Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER)
 
 
 def _guesses(
@@ -178,19 +209,15 @@ def _first(
 
 
 def _interpolated(
-    observed: Observed, first: Refined, scales: FloatArray
-) -> tuple[Refined, Observed, tuple[Observed, float]]:
-    """Return the fit with the better interpolation of the effort, that, and the other's share."""
-    every = range(len(NAMES))
-    for _ in range(2):  # the second time with the spread that is left, for both alike
-        first = refine(observed, first.parameters, every, scales, first.spread, first.starts)
-    straight = replace(observed, is_linear=True)
-    second = refine(straight, first.parameters, every, scales, first.spread, first.starts)
-    worse = second.around.cost - first.around.cost
-    share = DECIDED if abs(worse) > CLEAR else UNDECIDED
-    if worse > 0.0:
-        return first, observed, (straight, share)
-    return second, straight, (observed, share)
+    observed: Observed, found: Refined, free: list[int], scales: FloatArray
+) -> tuple[Refined, Observed, float]:
+    """Return the fit with the interpolation that explains most, that, and its standard error."""
+    error = 0.0
+    for _ in range(2):  # the second time with the spread that is left
+        share, error = straightness(observed, found, free, scales)
+        observed = replace(observed, straightness=share)
+        found = refine(observed, found.parameters, free, scales, found.spread, found.starts)
+    return found, observed, error
 
 
 def _told(
@@ -214,62 +241,3 @@ def _told(
         if not parameters[BOTH] > parameters[LAST]:
             parameters[[BOTH, LAST]] = believed[[BOTH, LAST]]
         found = refine(observed, parameters, free, scales, found.spread, found.starts)
-
-
-class _Doubt(NamedTuple):
-    """
-    Another way to see the recording.
-
-    Attributes
-    ----------
-    weight
-        Share of the difference that it makes which counts [-].
-    changed
-        The recording in that way.
-    cover
-        Factor on what it may leave in the residuals [-].
-
-    """
-
-    weight: float
-    changed: Observed
-    cover: float = 1.0
-
-
-def _errors(
-    doubtful: Sequence[_Doubt],
-    found: Refined,
-    free: list[int],
-    scales: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Return the covariance (8, 8) of the parameters, of noise and of what is doubtful.
-
-    For the doubtful ways to see the recording, each with the share of its difference that counts,
-    also what they leave that no step of the parameters takes away, shape (2,) [rad].
-    """
-    size = np.outer(scales[free], scales[free])
-    inside = covariance(found.around, scales[free]) * size
-    left = np.zeros(CHANNELS)
-    for weight, changed, cover in doubtful:
-        there = linearised(changed, found.parameters, found.starts, free, scales, found.spread)
-        normal = there.normal.sum(axis=0) * size + np.eye(len(free)) * 1e-12
-        change = there.gradient - found.around.gradient
-        moved = -scales[free] * np.linalg.solve(normal, scales[free] * change.sum(axis=0))
-        inside += weight**2 * np.outer(moved, moved)
-        left += (cover * weight * found.spread) ** 2 * _left(
-            there, found.around, moved, found.spread
-        )
-    whole = np.zeros((len(NAMES), len(NAMES)))
-    whole[np.ix_(free, free)] = inside
-    return whole, np.sqrt(left)
-
-
-def _left(
-    there: Linearisation, here: Linearisation, moved: FloatArray, spread: FloatArray
-) -> FloatArray:
-    """Return the mean square by which residuals differ after a step, weighted, shape (2,) [-]."""
-    each = (np.concatenate(there.residuals) - np.concatenate(here.residuals)) / spread
-    by_step = 2.0 * (there.gradient - here.gradient) @ moved + moved @ there.normal @ moved
-    result: FloatArray = np.maximum((each**2).sum(axis=0) + by_step, 0.0) / len(each)
-    return result

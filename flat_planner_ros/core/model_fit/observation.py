@@ -28,9 +28,9 @@ from flat_planner_ros.core.model_fit.measurements import (
     noise_of,
 )
 from flat_planner_ros.core.model_fit.signals import (
-    between,
     derivatives,
     FEWEST,
+    interpolated,
     segments_of,
     span_for,
 )
@@ -114,18 +114,12 @@ def with_base_errors(observed: Observed, measurements: Measurements, period: flo
     return replace(observed, base_errors=errors)
 
 
-def with_half_the_efforts(observed: Observed) -> Observed:
-    """Return a recording in which every other effort is interpolated between its neighbours."""
-    effort, times = observed.effort.copy(), observed.times
-    known, lost = slice(None, None, 2), slice(1, None, 2)
-    interpolated = np.interp if observed.is_linear else _on_cubics
-    effort[lost] = interpolated(times[lost], times[known], effort[known])
-    return replace(observed, effort=effort)
-
-
-def _on_cubics(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
-    """Return samples interpolated as `between` does, the arguments in NumPy's order."""
-    return between(times, values, at)
+def with_fewer_efforts(observed: Observed, every: int) -> Observed:
+    """Return a recording in which all but `every` second, third, ... effort are interpolated."""
+    times, effort = observed.times, observed.effort
+    known = times[::every], effort[::every]
+    fewer = interpolated(*known, times, observed.straightness)
+    return replace(observed, effort=fewer)
 
 
 def with_other_times(observed: Observed, seed: int) -> Observed:

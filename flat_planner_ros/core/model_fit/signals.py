@@ -110,6 +110,28 @@ def between(times: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray
     return hermite((inside - times[index]) / step, step, *ends)
 
 
+def interpolated(
+    times: FloatArray, values: FloatArray, at: FloatArray, straightness: float
+) -> FloatArray:
+    """
+    Return samples interpolated by cubics, straight lines, or what is between the two.
+
+    Parameters
+    ----------
+    times, values, at
+        As for `between`.
+    straightness
+        0 for the cubics, 1 for the lines [-].
+
+    """
+    if straightness == 0.0:
+        return between(times, values, at)
+    straight = np.interp(at, times, values)
+    if straightness == 1.0:
+        return straight
+    return straightness * straight + (1.0 - straightness) * between(times, values, at)
+
+
 def hermite(
     share: FloatArray,
     step: FloatArray,

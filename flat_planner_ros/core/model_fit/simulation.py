@@ -34,7 +34,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     step_for,
     trajectories,
 )
-from flat_planner_ros.core.model_fit.signals import between, hermite, Segment
+from flat_planner_ros.core.model_fit.signals import between, hermite, interpolated, Segment
 import numpy as np
 import numpy.typing as npt
 
@@ -71,8 +71,8 @@ class Observed:
         Standard deviation of the encoders' rounding in either angle, shape (2,) [rad].
     segments
         Pieces to simulate.
-    is_linear
-        Whether efforts go straight from sample to sample, instead of on cubics.
+    straightness
+        How far efforts go straight from sample to sample: 0 on cubics, 1 on lines, or between [-].
     refinement
         By which the steps of the integration are divided [-].
     turning
@@ -91,7 +91,7 @@ class Observed:
     moves: npt.NDArray[np.bool_]
     rounding: FloatArray
     segments: Sequence[Segment]
-    is_linear: bool = False
+    straightness: float = 0.0
     refinement: float = 1.0
     turning: FloatArray | None = None
     base_errors: BaseErrors | None = None
@@ -179,10 +179,7 @@ def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: flo
     """Return what moves the models; efforts come later by the delay."""
     delays, variant = np.unique(models[:, DELAY], return_inverse=True)
     shifted = grid[:, None, :] - delays[:, None]
-    if observed.is_linear:
-        effort = np.interp(shifted, observed.times, observed.effort)
-    else:
-        effort = between(observed.times, observed.effort, shifted)
+    effort = interpolated(observed.times, observed.effort, shifted, observed.straightness)
     base = between(observed.times, observed.base, grid) if observed.base.any() else 0.0 * grid
     turning = None
     if observed.turning is not None and models.shape[1] > IMBALANCE:
