@@ -14,6 +14,7 @@
 
 """The fit of the first n-2 links: weighted least squares of their rows, and what they tell."""
 
+from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
@@ -86,6 +87,9 @@ NULL, TINY = 1e-9, 1e-30
 
 GIVEN_UP_FIRST = (OFFSET, COULOMB, VISCOUS, MOMENT, OWN)
 """Of parameters that only together are told, the kind that is kept at its start value."""
+
+COARSER = 3.0
+"""What half the efforts add to an error of second order, relative to it [-]."""
 
 EXCESS, FLOOR = 1.5, 0.01
 """Effort left over relative to what noise explains, and to the effort, that is in doubt [-]."""
@@ -166,12 +170,24 @@ def fit_first_links(
         given_up = min(vague, key=lambda i: GIVEN_UP_FIRST.index(i // (start.n - 2)))
         free.remove(given_up)
         values[given_up] = believed[given_up]
-    smoother = _signals(measurements, period, delay, LONGER)
-    other, _ = _solved(smoother, chain, values, free, scales)
-    whole = np.outer(other - values, other - values)
-    whole[np.ix_(free, free)] += errors * np.outer(scales[free], scales[free])
+    whole = np.zeros((values.size, values.size))
+    whole[np.ix_(free, free)] = errors * np.outer(scales[free], scales[free])
+    for weight, changed in (
+        (1.0, _signals(measurements, period, delay, LONGER)),
+        (1 / COARSER, _signals(_with_half_the_efforts(measurements), period, delay)),
+    ):
+        other, _ = _solved(changed, chain, values, free, scales)
+        whole += weight**2 * np.outer(other - values, other - values)
     misfit = _doubt(found, values, chain, noise_of(measurements), parts)
     return FirstFit(values, free, whole, misfit)
+
+
+def _with_half_the_efforts(measurements: Measurements) -> Measurements:
+    """Return measurements in which every other effort lies straight between its neighbours."""
+    times, efforts = measurements.times, measurements.efforts.copy()
+    for column in efforts.T:
+        column[1::2] = np.interp(times[1::2], times[::2], column[::2])
+    return replace(measurements, efforts=efforts)
 
 
 def _signals(
