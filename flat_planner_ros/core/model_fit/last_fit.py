@@ -159,15 +159,17 @@ def _doubts(
     yield Doubt(1 / 3, change_between(found.around, plain, found.spread))
     straight = change(straighter(observed))
     yield Doubt(vague, straight)
+    if are_held:
+        # Fewer steps of a feedback tell nothing of what happens between them.
+        for seed in range(HELD_TIMES):
+            draw = change(with_other_times(observed, seed))
+            yield Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER)
+        return
     half, quarter = (
         change(with_fewer_efforts(observed, every)).besides(straight) for every in (2, 4)
     )
     weight = 1.0 / (quarter.growth_from(half) - 1.0)
     yield Doubt(weight, half, 1 / 3 / weight)
-    if are_held:
-        for seed in range(HELD_TIMES):
-            draw = change(with_other_times(observed, seed))
-            yield Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER)
 
 
 def _guesses(
