@@ -19,6 +19,7 @@ import os
 from pathlib import Path
 
 from flat_planner_ros.programs import THREADS
+from flat_planner_ros.ros.dds_profile import profile_environment
 from hypothesis import settings
 import pytest
 
@@ -45,10 +46,8 @@ settings.load_profile('ci' if os.environ.get('CI') else 'local')
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-# Before the first node is made: without it nodes may find each other 3 s late. Fast DDS 3 has
-# other names for the periods of heartbeats: it reads another variable, and is left as it is.
-PROFILES = str(CHECKOUT / 'config' / 'dds' / 'fastdds.xml')
-os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', PROFILES)
+# Before the first node is made: without it nodes may find each other 3 s late.
+os.environ.update(profile_environment(os.environ))
 
 # Before linear algebra is loaded, as programs do: more threads would wait for each other.
 for variable in THREADS:

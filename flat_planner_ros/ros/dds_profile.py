@@ -22,23 +22,27 @@ from collections.abc import Mapping
 import os
 from pathlib import Path
 
-VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
-"""Environment variables that name the profiles, of Fast DDS 2 and of Fast DDS 3."""
+FILES = {
+    'FASTRTPS_DEFAULT_PROFILES_FILE': 'fastdds.xml',
+    'FASTDDS_DEFAULT_PROFILES_FILE': 'fastdds3.xml',
+}
+"""Environment variables that name the profiles, of Fast DDS 2 and 3, and our file for each."""
 
 OWN_FILES = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
 """Files in the present directory that Fast DDS reads by itself."""
 
-PROFILES = Path('config', 'dds', 'fastdds.xml')
+PROFILES = Path('config', 'dds')
 """Place of the profiles in the package's share directory, and in the sources."""
 
 
-def profiles_file() -> Path | None:
-    """Return the installed profiles, else those beside the sources; None where neither is."""
+def profiles() -> dict[str, str]:
+    """Return our file for each variable, of the sources, else installed; none where neither is."""
     package = Path(__file__).parents[1]
     prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
     shares = [Path(prefix, 'share', package.name) for prefix in prefixes]
     places = [package.parent, *shares]
-    return next((p / PROFILES for p in places if (p / PROFILES).is_file()), None)
+    found = next((p / PROFILES for p in places if (p / PROFILES).is_dir()), None)
+    return {} if found is None else {name: str(found / file) for name, file in FILES.items()}
 
 
 def profile_environment(environment: Mapping[str, str]) -> dict[str, str]:
@@ -52,7 +56,6 @@ def profile_environment(environment: Mapping[str, str]) -> dict[str, str]:
         Fast DDS, nothing is added.
 
     """
-    has_own = any(environment.get(name) for name in VARIABLES)
+    has_own = any(environment.get(name) for name in FILES)
     has_own = has_own or any(Path(name).is_file() for name in OWN_FILES)
-    file = None if has_own else profiles_file()
-    return {} if file is None else dict.fromkeys(VARIABLES, str(file))
+    return {} if has_own else profiles()

@@ -14,13 +14,16 @@
 
 """Planner and plant on two computers: a network that loses, delays and reorders packets."""
 
+import os
 from pathlib import Path
+import subprocess
+import sys
 from time import monotonic
 
-from flat_planner_ros.ros.dds_profile import OWN_FILES, profile_environment, VARIABLES
+from flat_planner_ros.ros.dds_profile import FILES, OWN_FILES, profile_environment
 import pytest
 from ros.conftest import Graph, TIMEOUT
-from ros.network.two_computers import Network, NO_HARM, PROFILES
+from ros.network.two_computers import Network, NO_HARM, PROFILED, PROFILES
 
 DURATION = 0.5
 
@@ -191,9 +194,27 @@ def test_an_arm_whose_clock_is_ahead_is_refused_and_rests(network, user):
 
 def test_the_profiles_are_added_unless_the_user_has_some(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert set(profile_environment({})) == set(VARIABLES)
-    (file,) = set(profile_environment({}).values())
-    assert Path(file).read_text('utf-8') == PROFILES.read_text('utf-8')
-    assert profile_environment({VARIABLES[0]: 'mine.xml'}) == {}
+    found = profile_environment({})
+    assert set(found) == set(FILES)
+    for file in map(Path, found.values()):
+        assert file.read_text('utf-8') == (PROFILES / file.name).read_text('utf-8')
+    for variable in FILES:
+        assert profile_environment({variable: 'mine.xml'}) == {}
     (tmp_path / OWN_FILES[0]).write_text('<dds/>', 'utf-8')
     assert profile_environment({}) == {}
+
+
+def test_the_middleware_reads_its_profile_without_a_complaint(ros_domain):
+    """Fast DDS gives up a whole file for one element that it does not know, and goes on."""
+    program = 'import rclpy; rclpy.init(); rclpy.create_node("alone"); rclpy.shutdown()'
+    given = {**os.environ, **PROFILED, 'ROS_DOMAIN_ID': str(ros_domain)}
+    command = [sys.executable, '-c', program]
+    ended = subprocess.run(command, env=given, capture_output=True, text=True, timeout=TIMEOUT)
+    assert (ended.returncode, ended.stdout + ended.stderr) == (0, '')
+
+
+def test_both_profiles_say_the_same():
+    """Fast DDS 3 has other names for the periods of heartbeats."""
+    older, newer = ((PROFILES / file).read_text('utf-8').lower() for file in FILES.values())
+    settings = [text[text.index('<dds') :].replace('_', '') for text in (older, newer)]
+    assert settings[0] == settings[1]

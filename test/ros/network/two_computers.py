@@ -22,13 +22,13 @@ from pathlib import Path
 import subprocess
 import sys
 
-from flat_planner_ros.ros.dds_profile import VARIABLES
+from flat_planner_ros.ros.dds_profile import FILES
 import pytest
 from ros.conftest import TIMEOUT
 
 HERE = Path(__file__).resolve().parent
-PROFILES = HERE.parents[2] / 'config' / 'dds' / 'fastdds.xml'
-PROFILED = dict.fromkeys(VARIABLES, str(PROFILES))
+PROFILES = HERE.parents[2] / 'config' / 'dds'
+PROFILED = {name: str(PROFILES / file) for name, file in FILES.items()}
 SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
 
 NO_HARM = (0.0, 0.0, 0.0)
@@ -116,7 +116,7 @@ class Network:
 
     def _program(self, command, environment, **options):
         """Start a program that is spoken to, with the middleware's profile only if it is given."""
-        bare = {name: text for name, text in os.environ.items() if name not in VARIABLES}
+        bare = {name: text for name, text in os.environ.items() if name not in FILES}
         return subprocess.Popen(
             command,
             env={**bare, **environment},

@@ -23,7 +23,7 @@ import sys
 from time import monotonic
 
 from flat_planner_ros.figures.paper_example import SCENARIOS
-from flat_planner_ros.ros.dds_profile import VARIABLES
+from flat_planner_ros.ros.dds_profile import FILES
 import pytest
 import yaml
 
@@ -46,7 +46,7 @@ files = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == '--params-file'
 contents = [yaml.safe_load(pathlib.Path(file).read_text()) for file in files]
 name = next((a[8:] for a in sys.argv if a.startswith('__node:=')), pathlib.Path(sys.argv[0]).name)
 path = pathlib.Path(RECORDS) / name
-profiles = os.environ.get('{VARIABLES[0]}', '')
+profiles = os.environ.get('{next(iter(FILES))}', '')
 path.with_suffix('.tmp').write_text(yaml.dump([sys.argv[1:], contents, profiles]))
 path.with_suffix('.tmp').rename(path)
 signal.sigwait([signal.SIGINT, signal.SIGTERM])
@@ -82,7 +82,7 @@ class Launched:
         """Return the arguments and parameter files of programs, by the names of their nodes."""
         command = [sys.executable, '-c', ROS2, 'launch', str(LAUNCH / file), *arguments]
         prefixes = [str(self.prefix), os.environ.get('AMENT_PREFIX_PATH', '')]
-        inherited = {name: text for name, text in os.environ.items() if name not in VARIABLES}
+        inherited = {name: text for name, text in os.environ.items() if name not in FILES}
         environment = {
             **inherited,
             'AMENT_PREFIX_PATH': os.pathsep.join(prefixes),
