@@ -19,9 +19,8 @@ It has topics of the planner's types, as loading them is a part of that.
 """
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from processes import BARE_ANSWER, EVENTS, new_executor
+from processes import BARE_ANSWER, EVENTS, spin
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
@@ -47,16 +46,7 @@ def main() -> None:
         node.create_publisher(kind, f'~/{kind.__name__.lower()}', DEPTH)
     node.create_subscription(JointState, '~/jointstate', lambda _: None, DEPTH)
     node.create_service(Trigger, BARE_ANSWER, _answer)
-    executor = new_executor(EVENTS)
-    executor.add_node(node)
-    try:
-        while rclpy.ok():
-            executor.spin_once(timeout_sec=0.1)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    spin(node, EVENTS)
 
 
 if __name__ == '__main__':

@@ -23,9 +23,8 @@ from array import array
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from flat_planner_ros.ros.wire import interfaces, stamps
-from processes import EVENTS, new_executor
+from processes import EVENTS, spin
 import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
@@ -83,16 +82,7 @@ def main() -> None:
     node.create_subscription(
         JointState, interfaces.JOINT_STATES, lambda _: None, interfaces.SENSOR_DATA
     )
-    executor = new_executor(EVENTS)
-    executor.add_node(node)
-    try:
-        while rclpy.ok():
-            executor.spin_once(timeout_sec=0.1)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    spin(node, EVENTS)
 
 
 if __name__ == '__main__':

@@ -215,6 +215,21 @@ def new_executor(name: str):  # noqa: ANN201  The two classes have no common one
     return SingleThreadedExecutor()
 
 
+def spin(node: Node, executor_name: str) -> None:
+    """Spin a node until the process is asked to end."""
+    executor = new_executor(executor_name)
+    executor.add_node(node)
+    try:
+        # A spin without a timeout would starve the callbacks of an EventsExecutor.
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=0.1)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
 def stamp_of(serialised: bytes, offset: int = 4) -> float:
     """Return the stamp at the front of a serialised message [s]."""
     seconds, nanoseconds = STAMP.unpack_from(serialised, offset)

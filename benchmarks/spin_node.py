@@ -17,9 +17,8 @@
 from importlib import import_module
 import sys
 
-from processes import new_executor
+from processes import spin
 import rclpy
-from rclpy.executors import ExternalShutdownException
 
 
 def main() -> None:
@@ -28,17 +27,7 @@ def main() -> None:
     rclpy.init(args=[sys.argv[0], *arguments])
     module = import_module(f'flat_planner_ros.ros.nodes.{name}_node')
     node = getattr(module, f'{name.capitalize()}Node')()
-    executor = new_executor(executor_name)
-    executor.add_node(node)
-    try:
-        # A spin without a timeout would starve the callbacks of an EventsExecutor.
-        while rclpy.ok():
-            executor.spin_once(timeout_sec=0.1)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+    spin(node, executor_name)
 
 
 if __name__ == '__main__':
