@@ -19,6 +19,7 @@ from importlib import import_module
 import inspect
 from pathlib import Path
 import re
+from typing import get_origin
 
 from flat_planner_ros import core
 import pytest
@@ -29,7 +30,11 @@ LISTED = {
     for wing in WINGS
     for name in import_module(f'{core.__name__}.{wing}').__all__
 }
-CLASSES = {name: value for name, value in LISTED.items() if inspect.isclass(value)}
+CLASSES = {
+    name: value
+    for name, value in LISTED.items()
+    if inspect.isclass(value) and get_origin(value) is None  # an alias is a class in Python 3.10
+}
 FUNCTIONS = {name: value for name, value in LISTED.items() if inspect.isfunction(value)}
 CONSTANTS = {name for name, value in LISTED.items() if isinstance(value, int | float | str)}
 ALIASES = re.compile(r'^(\w+(?:, \w+)*)(?: : .*)?$', re.MULTILINE)
