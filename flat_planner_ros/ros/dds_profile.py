@@ -21,6 +21,7 @@ Fast DDS reads a file of profiles that an environment variable names, when the f
 from collections.abc import Mapping
 import os
 from pathlib import Path
+import sys
 
 FILES = {
     'FASTRTPS_DEFAULT_PROFILES_FILE': 'fastdds.xml',
@@ -31,18 +32,24 @@ FILES = {
 OWN_FILES = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
 """Files in the present directory that Fast DDS reads by itself."""
 
+NEWER = 'libfastdds.so'
+"""Library that Fast DDS 3 has in the place of `libfastrtps.so`."""
+
 PROFILES = Path('config', 'dds')
 """Place of the profiles in the package's share directory, and in the sources."""
 
 
 def profiles() -> dict[str, str]:
-    """Return our file for each variable, of the sources, else installed; none where neither is."""
+    """Return the variable of the Fast DDS at hand with our file; nothing where there is none."""
     package = Path(__file__).parents[1]
-    prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    prefixes = [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))]
+    # Only one of them: with the variable of Fast DDS 2, ROS from Kilted on ignores the other one.
+    is_newer = any(Path(prefix, 'lib', NEWER).exists() for prefix in (*prefixes, sys.prefix))
+    variable, name = tuple(FILES.items())[is_newer]
     shares = [Path(prefix, 'share', package.name) for prefix in prefixes]
     places = [package.parent, *shares]
-    found = next((p / PROFILES for p in places if (p / PROFILES).is_dir()), None)
-    return {} if found is None else {name: str(found / file) for name, file in FILES.items()}
+    files = (place / PROFILES / name for place in places)
+    return next(({variable: str(file)} for file in files if file.is_file()), {})
 
 
 def profile_environment(environment: Mapping[str, str]) -> dict[str, str]:

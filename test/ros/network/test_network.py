@@ -195,7 +195,8 @@ def test_an_arm_whose_clock_is_ahead_is_refused_and_rests(network, user):
 def test_the_profiles_are_added_unless_the_user_has_some(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = profile_environment({})
-    assert set(found) == set(FILES)
+    assert len(found) == 1
+    assert set(found) <= set(FILES)
     for file in map(Path, found.values()):
         assert file.read_text('utf-8') == (PROFILES / file.name).read_text('utf-8')
     for variable in FILES:

@@ -22,13 +22,13 @@ from pathlib import Path
 import subprocess
 import sys
 
-from flat_planner_ros.ros.dds_profile import FILES
+from flat_planner_ros.ros.dds_profile import FILES, profiles
 import pytest
 from ros.conftest import TIMEOUT
 
 HERE = Path(__file__).resolve().parent
 PROFILES = HERE.parents[2] / 'config' / 'dds'
-PROFILED = {name: str(PROFILES / file) for name, file in FILES.items()}
+PROFILED = profiles()
 SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
 
 NO_HARM = (0.0, 0.0, 0.0)
