@@ -18,7 +18,7 @@ import os
 from pathlib import Path
 
 from flat_planner_ros.core import Strategy
-from flat_planner_ros.ros.dds_profile import FILES, profile_environment
+from flat_planner_ros.ros.dds_profile import profile_environment, variable
 from launch import LaunchContext, LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -136,7 +136,7 @@ def _profile(context: LaunchContext) -> list[SetEnvironmentVariable]:
     chosen = LaunchConfiguration('dds_profile').perform(context)
     if chosen == 'none':
         return []
-    found = profile_environment(os.environ) if chosen == 'auto' else dict.fromkeys(FILES, chosen)
+    found = profile_environment(os.environ) if chosen == 'auto' else {variable(): chosen}
     return [SetEnvironmentVariable(name, value) for name, value in found.items()]
 
 

@@ -39,17 +39,23 @@ PROFILES = Path('config', 'dds')
 """Place of the profiles in the package's share directory, and in the sources."""
 
 
+def variable() -> str:
+    """Return which of them the Fast DDS at hand reads; with both, Kilted ignores its own."""
+    libraries = (Path(prefix, 'lib', NEWER) for prefix in (*_prefixes(), sys.prefix))
+    return tuple(FILES)[any(library.exists() for library in libraries)]
+
+
 def profiles() -> dict[str, str]:
     """Return the variable of the Fast DDS at hand with our file; nothing where there is none."""
-    package = Path(__file__).parents[1]
-    prefixes = [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))]
-    # Only one of them: with the variable of Fast DDS 2, ROS from Kilted on ignores the other one.
-    is_newer = any(Path(prefix, 'lib', NEWER).exists() for prefix in (*prefixes, sys.prefix))
-    variable, name = tuple(FILES.items())[is_newer]
-    shares = [Path(prefix, 'share', package.name) for prefix in prefixes]
-    places = [package.parent, *shares]
-    files = (place / PROFILES / name for place in places)
-    return next(({variable: str(file)} for file in files if file.is_file()), {})
+    package, name = Path(__file__).parents[1], variable()
+    shares = [Path(prefix, 'share', package.name) for prefix in _prefixes()]
+    files = (place / PROFILES / FILES[name] for place in (package.parent, *shares))
+    return next(({name: str(file)} for file in files if file.is_file()), {})
+
+
+def _prefixes() -> list[str]:
+    """Return where packages of ROS are installed."""
+    return [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))]
 
 
 def profile_environment(environment: Mapping[str, str]) -> dict[str, str]:

@@ -20,7 +20,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.model_fit.judgement import correlation_length, covariance
+from flat_planner_ros.core.model_fit.judgement import correlation_lengths, covariance
 from flat_planner_ros.core.model_fit.last_links import NAMES
 from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, Refined
 from flat_planner_ros.core.model_fit.simulation import CHANNELS, Observed
@@ -140,13 +140,10 @@ def straightness(
     there = linearised(straighter(observed), *point)
     change = change_between(found.around, there, found.spread)
     step = change.step(scales[free])
-    lengths = [
-        correlation_length([part[:, channel] for part in found.around.residuals])
-        for channel in range(CHANNELS)
-    ]
-    told = float(change.left(step).sum()) * len(change.residuals) / max(lengths)
+    alike = max(correlation_lengths(found.around))
+    told = float(change.left(step).sum()) * len(change.residuals) / alike
     along = np.concatenate(found.around.residuals) / found.spread * change.residuals
-    slope = float(along.sum() + found.around.gradient.sum(axis=0) @ step) / max(lengths)
+    slope = float(along.sum() + found.around.gradient.sum(axis=0) @ step) / alike
     whole = told + SPREAD**-2
     pull = slope + (observed.straightness - MIDDLE) / SPREAD**2
     return observed.straightness - pull / whole, whole**-0.5

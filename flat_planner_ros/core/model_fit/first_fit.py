@@ -14,7 +14,6 @@
 
 """The fit of the first n-2 links: weighted least squares of their rows, and what they tell."""
 
-from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
@@ -173,8 +172,8 @@ def fit_first_links(
     whole = np.zeros((values.size, values.size))
     whole[np.ix_(free, free)] = errors * np.outer(scales[free], scales[free])
     for weight, changed in (
-        (1.0, _signals(measurements, period, delay, LONGER)),
-        (1 / COARSER, _signals(_with_half_the_efforts(measurements), period, delay)),
+        (1.0, _signals(measurements, period, delay, longer=LONGER)),
+        (1 / COARSER, _signals(measurements, period, delay, every=2)),
     ):
         other, _ = _solved(changed, chain, values, free, scales)
         whole += weight**2 * np.outer(other - values, other - values)
@@ -182,18 +181,10 @@ def fit_first_links(
     return FirstFit(values, free, whole, misfit)
 
 
-def _with_half_the_efforts(measurements: Measurements) -> Measurements:
-    """Return measurements in which every other effort lies straight between its neighbours."""
-    times, efforts = measurements.times, measurements.efforts.copy()
-    for column in efforts.T:
-        column[1::2] = np.interp(times[1::2], times[::2], column[::2])
-    return replace(measurements, efforts=efforts)
-
-
 def _signals(
-    measurements: Measurements, period: float, delay: float, longer: float = 1.0
+    measurements: Measurements, period: float, delay: float, *, longer: float = 1.0, every: int = 1
 ) -> list[tuple[ChainSignals, Windows]]:
-    """Return each stretch without gaps on an even grid, with its windows."""
+    """Return each stretch without gaps on an even grid, with its windows; `every` k-th effort."""
     found = []
     sample = measurements.period
     noise = float(np.linalg.norm(noise_of(measurements)[:-1]))
@@ -210,13 +201,13 @@ def _signals(
         angles = np.column_stack([np.interp(grid, times, column) for column in absolute.T])
         rates = derivatives(grid, angles, span)[1]
         joints = np.diff(rates, axis=1, prepend=0.0)
-        efforts = measurements.efforts[first:last].T
+        known, efforts = times[::every], measurements.efforts[first:last:every].T
         signals = ChainSignals(
             times=grid,
             angles=angles[:, :-1],
             rates=rates[:, :-1],
             last_rate=joints[:, -1],
-            efforts=np.column_stack([np.interp(grid - delay, times, each) for each in efforts]),
+            efforts=np.column_stack([np.interp(grid - delay, known, each) for each in efforts]),
             resting=(np.abs(joints) < RESTING * COULOMB_VELOCITY).astype(float),
         )
         found.append((signals, windows))

@@ -65,6 +65,14 @@ def correlation_length(residuals: Sequence[FloatArray]) -> float:
     return max(1.0, 2.0 * float(pairs[:count].sum()) - 1.0)
 
 
+def correlation_lengths(around: Linearisation) -> list[float]:
+    """Return the correlation length of either channel's residuals [-]."""
+    parts = around.residuals
+    return [
+        correlation_length([part[:, channel] for part in parts]) for channel in range(CHANNELS)
+    ]
+
+
 def _products(values: FloatArray, lags: int) -> FloatArray:
     """Return the sums of products of values that are 0, 1, ... samples apart, shape (lags,)."""
     return np.array([float(values[lag:] @ values[: values.size - lag]) for lag in range(lags)])
@@ -90,10 +98,7 @@ def covariance(around: Linearisation, scales: FloatArray) -> FloatArray:
 
     """
     size = np.outer(scales, scales)
-    lengths = [
-        correlation_length([part[:, channel] for part in around.residuals])
-        for channel in range(CHANNELS)
-    ]
+    lengths = correlation_lengths(around)
     prior = np.eye(scales.size) / FAR_PRIOR**2
     inverse = np.linalg.inv(around.normal.sum(axis=0) * size + prior)
     by_length = inverse @ (np.tensordot(lengths, around.normal, axes=1) * size + prior) @ inverse
@@ -122,8 +127,7 @@ def doubt(around: Linearisation, spread: FloatArray, noise: FloatArray, motion: 
     """
     names = 'link n-1', 'the passive joint'
     found = []
-    for channel in range(CHANNELS):
-        length = correlation_length([part[:, channel] for part in around.residuals])
+    for channel, length in enumerate(correlation_lengths(around)):
         allowed = float(np.hypot(noise[channel], MODEL_FLOOR * motion[channel]))
         ratio = float(spread[channel]) / allowed
         if ratio > EXCESS or (ratio > REGULAR_EXCESS and length > REGULAR):

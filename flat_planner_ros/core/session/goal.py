@@ -158,9 +158,6 @@ def _check_joints(goal: Goal, joints: Sequence[str]) -> None:
         raise RequestRejected(Reason.EMPTY_GOAL, f'the goal has no {missing}')
     check_point_count(len(goal.points))
     known = ', '.join(joints)
-    named = set(goal.joint_names)
-    if len(named) == len(goal.joint_names) and set(joints[:-1]) <= named <= set(joints):
-        return
     for name, count in Counter(goal.joint_names).items():
         if name not in joints:
             problem = f'unknown joint {name[:MAX_NAME]!r}'

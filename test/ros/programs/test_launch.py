@@ -23,7 +23,7 @@ import sys
 from time import monotonic
 
 from flat_planner_ros.figures.paper_example import SCENARIOS
-from flat_planner_ros.ros.dds_profile import FILES
+from flat_planner_ros.ros.dds_profile import FILES, variable
 import pytest
 import yaml
 
@@ -46,7 +46,7 @@ files = [sys.argv[i + 1] for i, a in enumerate(sys.argv) if a == '--params-file'
 contents = [yaml.safe_load(pathlib.Path(file).read_text()) for file in files]
 name = next((a[8:] for a in sys.argv if a.startswith('__node:=')), pathlib.Path(sys.argv[0]).name)
 path = pathlib.Path(RECORDS) / name
-profiles = os.environ.get('{next(iter(FILES))}', '')
+profiles = os.environ.get('{variable()}', '')
 path.with_suffix('.tmp').write_text(yaml.dump([sys.argv[1:], contents, profiles]))
 path.with_suffix('.tmp').rename(path)
 signal.sigwait([signal.SIGINT, signal.SIGTERM])
@@ -146,7 +146,8 @@ NODES = ['flat_planner', 'flat_plant', 'flat_monitor']
 
 def test_nodes_are_given_the_profiles_of_the_middleware(launched):
     records = launched.run('demo.launch.py', 'view:=false', names=NODES)
-    assert {Path(record[2]).name for record in records.values()} == {'fastdds.xml'}
+    wanted = dict(zip(FILES, ('fastdds.xml', 'fastdds3.xml'), strict=True))[variable()]
+    assert {Path(record[2]).name for record in records.values()} == {wanted}
 
 
 @pytest.mark.parametrize(('chosen', 'found'), [('none', ''), ('/my/own.xml', '/my/own.xml')])
