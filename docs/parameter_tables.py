@@ -23,6 +23,7 @@ import sys
 from flat_planner_ros.ros.parameters import monitor, planner, plant, tracker
 from flat_planner_ros.ros.parameters.arm_model import MODEL_ROWS
 from flat_planner_ros.ros.parameters.row import Row
+from rclpy.parameter import Parameter
 
 PAGE = Path(__file__).resolve().parent / 'interfaces.md'
 """The page with the tables."""
@@ -64,10 +65,11 @@ def _rows(name: str) -> Iterator[Row]:
 def _line(row: Row) -> str:
     """Return a row of a table."""
     default = row.default
-    if isinstance(default, bool):
-        shown = f'`{str(default).lower()}`'
+    # Asked first: in some ROS distributions a type is an integer, too.
+    if isinstance(default, Parameter.Type):
+        shown = 'not set'
     else:
-        shown = f'`{default}`' if isinstance(default, str | float | int | list) else 'not set'
+        shown = f'`{str(default).lower()}`' if isinstance(default, bool) else f'`{default}`'
     meaning = row.description + (', *fixed*' if row.read_only else '')
     return f'| `{row.name}` | {shown} |{_allowed(row)}| {_escaped(meaning)} |\n'
 

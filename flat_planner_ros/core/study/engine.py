@@ -20,7 +20,7 @@ they are finished; few are under way or wait at a time, so that memory does not 
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
 from typing import NamedTuple, TypeVar
 
@@ -56,7 +56,7 @@ def chunks_of(first: int, stop: int, size: int) -> Iterator[Chunk]:
 
 def here(
     work: Callable[[int, int], Result], chunks: Iterator[Chunk]
-) -> Iterator[tuple[Chunk, Result]]:
+) -> Generator[tuple[Chunk, Result], None, None]:
     """Return what comes of chunks that this process does itself, one after the other."""
     for chunk in chunks:
         yield chunk, work(*chunk)
@@ -67,7 +67,7 @@ def on_executor(
     chunks: Iterator[Chunk],
     executor: Callable[[], Executor],
     workers: int,
-) -> Iterator[tuple[Chunk, Result]]:
+) -> Generator[tuple[Chunk, Result], None, None]:
     """
     Return what comes of chunks that others do, in the order of the chunks.
 

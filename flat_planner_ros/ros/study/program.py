@@ -24,12 +24,13 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace, RawDescriptio
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 import csv
 import os
 from pathlib import Path
 import signal
 import sys
+from threading import Event
 from time import perf_counter
 from typing import Any
 
@@ -262,7 +263,7 @@ def _write_parquet(options: Namespace, study: Study, target: Path, fingerprint: 
 
 def _fill(options: Namespace, study: Study, add: Callable[[str], object], done: int) -> int:
     """Do the rows from a number on; return the exit code."""
-    with _engine(options) as engine, _interruptible():
+    with _engine(options) as engine, _interruptible() as interrupted:
         chunks = chunks_of(done, study.count, study.chunk)
         (executor, workers), work = engine, Lines(study=study)
         found = (
@@ -270,16 +271,13 @@ def _fill(options: Namespace, study: Study, add: Callable[[str], object], done: 
             if executor is None
             else on_executor(work, chunks, executor, workers)
         )
-        try:
-            with progress(float(study.count), 'study') as advance:
-                advance(done)
-                for chunk, lines in found:
-                    add(lines)
-                    advance(chunk.stop - chunk.first)
-        except KeyboardInterrupt:
-            return INTERRUPTED
-        finally:
-            found.close()  # type: ignore[attr-defined]  # both are generators
+        with closing(found), progress(float(study.count), 'study') as advance:
+            advance(done)
+            for chunk, lines in found:
+                add(lines)
+                advance(chunk.stop - chunk.first)
+                if interrupted.is_set() and chunk.stop < study.count:
+                    return INTERRUPTED
     return 0
 
 
@@ -297,18 +295,24 @@ def _engine(options: Namespace) -> Iterator[tuple[Callable[[], Executor] | None,
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let the first signal stop the work, and a second one the process."""
+def _interruptible() -> Iterator[Event]:
+    """
+    Let the first signal stop the work after the chunk under way, and a second one the process.
+
+    An exception instead could come up in the middle of an executor's `submit`, which then holds a
+    task that nobody does and waits for it for ever.
+    """
+    interrupted = Event()
 
     def stop(_number: int, _frame: object) -> None:
-        for number in signals:
-            signal.signal(number, lambda *_: os._exit(INTERRUPTED))
-        raise KeyboardInterrupt
+        if interrupted.is_set():
+            os._exit(INTERRUPTED)
+        interrupted.set()
 
     signals = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, stop) for number in signals]
     try:
-        yield
+        yield interrupted
     finally:
         for number, handler in zip(signals, before, strict=True):
             signal.signal(number, handler)

@@ -23,6 +23,7 @@ import shlex
 import signal
 import subprocess
 import sys
+from time import sleep
 
 from flat_planner_ros.ros.programs import flat_plan
 from flat_planner_ros.ros.study import program as study
@@ -55,6 +56,13 @@ def run(spec, output, *more):
     """Run the study without the column that is never the same; return the text of its table."""
     assert study.main([str(spec), '-o', str(output), '--no-times', *more]) == 0
     return output.read_text(encoding='utf-8')
+
+
+def wait_for_rows(output, process):
+    """Wait until a process has written a chunk."""
+    while not (output.exists() and output.read_bytes().count(b'\n') > 8):
+        assert process.poll() is None
+        sleep(0.005)
 
 
 def table_of(text):
@@ -138,8 +146,7 @@ def test_an_interrupted_study_goes_on(spec, tmp_path):
         [sys.executable, '-c', CODE, *words], stderr=subprocess.PIPE, text=True
     )
     # It has written a chunk: now it is in the midst of another one.
-    while not (output.exists() and output.read_bytes().count(b'\n') > 8):
-        assert process.poll() is None
+    wait_for_rows(output, process)
     process.send_signal(signal.SIGINT)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 130
@@ -284,8 +291,7 @@ def test_a_cluster_writes_the_same_table_whichever_worker_dies(spec, whole, tmp_
             ]
         )
         output = tmp_path / 'dask.csv'
-        while not (output.exists() and output.read_bytes().count(b'\n') > 8):
-            assert process.poll() is None
+        wait_for_rows(output, process)
         victim = next(iter(cluster.workers.values()))
         os.kill(victim.pid, signal.SIGKILL)
         assert process.wait(timeout=120) == 0
