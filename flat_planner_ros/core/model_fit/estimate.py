@@ -37,7 +37,8 @@ class ParameterEstimate:
     is_told
         Whether the motion tells it.
     remark
-        What would tell it, or what the value rests on; may be empty.
+        What would tell it, or tell it better where it is not known to half of itself, or what the
+        value rests on; may be empty.
 
     """
 

@@ -37,9 +37,12 @@ from flat_planner_ros.core.model_fit.last_links import (
 from flat_planner_ros.core.model_fit.measurements import Measurements
 from flat_planner_ros.core.model_fit.observation import noise_of_links
 from flat_planner_ros.core.model_fit.scales import vector_of
-from flat_planner_ros.core.model_fit.table import entries
+from flat_planner_ros.core.model_fit.table import entries, Entry
 import numpy as np
 import numpy.typing as npt
+
+UNCERTAIN = 0.5
+"""Standard error of an estimate from which it is hardly told, relative to it [-]."""
 
 
 class Trust(Enum):
@@ -179,19 +182,31 @@ def _result(
 
 def _estimates(start: PlanarArm, whole: _Whole) -> tuple[ParameterEstimate, ...]:
     """Return all parameters with what would tell those that are not told."""
-    stds = np.sqrt(np.diag(whole.errors))
+    stds = np.where(whole.is_told, np.sqrt(np.diag(whole.errors)), inf).tolist()
+    table = entries(start.n, has_gravity=start.gravity != 0.0)
+    rows = zip(table, whole.believed.tolist(), whole.values.tolist(), stds, strict=True)
     return tuple(
         ParameterEstimate(
             name=entry.name,
             unit=entry.unit,
-            start=float(whole.believed[index]),
-            value=float(whole.values[index]),
-            std=float(stds[index]) if whole.is_told[index] else inf,
-            is_told=bool(whole.is_told[index]),
-            remark='' if whole.is_told[index] else f'{entry.telling} would tell it',
+            start=believed,
+            value=value,
+            std=std,
+            is_told=std < inf,
+            remark=_remark(entry, value, std),
         )
-        for index, entry in enumerate(entries(start.n, has_gravity=start.gravity != 0.0))
+        for entry, believed, value, std in rows
     )
+
+
+def _remark(entry: Entry, value: float, std: float) -> str:
+    """Return what would tell a parameter, or tell one better that has a standard error."""
+    if std == inf:
+        return f'{entry.telling} would tell it'
+    # Offsets and delays may well be zero.
+    if entry.unit in ('rad', 's') or std < UNCERTAIN * abs(value):
+        return ''
+    return f'hardly told; {entry.telling} would tell it better'
 
 
 def _arm(start: PlanarArm, values: FloatArray) -> PlanarArm:

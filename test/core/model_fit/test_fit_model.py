@@ -107,6 +107,9 @@ def test_uneven_times_and_a_gap_do_no_harm():
     fit = fit_model(measured(pushes, times, spring=linear, noise=1e-5, **FREE), BELIEVED)
     assert [fit.arm.stiffness, fit.arm.damping] == pytest.approx([STIFFNESS, DAMPING], rel=0.005)
     assert fit.arm.inertia_star == pytest.approx((7e-4, 3e-5), rel=0.005)
+    # There is no friction: an estimate of it is not known to half of itself.
+    assert fit.estimate('coulomb_friction[1]').remark.startswith('hardly told; slow motions')
+    assert fit.estimate('stiffness').remark == ''
 
 
 def test_scipy_alone_finds_the_same_from_a_random_start():
