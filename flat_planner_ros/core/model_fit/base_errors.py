@@ -83,10 +83,22 @@ class BaseErrors(NamedTuple):
             Shape (g, models, segments) [rad/s].
 
         """
-        away = np.abs(grid.T[:, :, None] - self.nodes[:, None, :]) / self.spacing
-        errors = self.roots @ units.transpose(2, 1, 0)
-        found: FloatArray = np.maximum(1.0 - away, 0.0) @ errors
-        return found.transpose(1, 2, 0)
+        return self._between(grid, self.roots @ units.transpose(2, 1, 0)).transpose(0, 2, 1)
+
+    def slopes(self, grid: FloatArray) -> FloatArray:
+        """Return the derivatives of the errors by the unknowns, shape (g, segments, K) [rad/s]."""
+        return self._between(grid, self.roots)
+
+    def _between(self, grid: FloatArray, values: FloatArray) -> FloatArray:
+        """Return values at the nodes (segments, K, c) between them, shape (g, segments, c)."""
+        found = np.zeros((*grid.shape, values.shape[-1]))
+        for number, (times, nodes) in enumerate(zip(grid.T, self.nodes, strict=True)):
+            after = np.searchsorted(nodes, times)
+            for node in (after - 1, np.minimum(after, nodes.size - 1)):
+                share = 1.0 - np.abs(times - nodes[node]) / self.spacing
+                near = np.flatnonzero((share > 0.0) & (node >= 0))
+                found[near, number] += share[near, None] * values[number, node[near]]
+        return found
 
 
 class Smoothing(NamedTuple):

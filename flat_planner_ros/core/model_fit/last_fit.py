@@ -65,6 +65,9 @@ LITTLE = 2.0
 COARSE = 0.3
 """Refinement of the steps for a first fit [-]."""
 
+ROUGH = 0.1
+"""Last step of a first fit, relative to the standard errors of white noise [-]."""
+
 FINE = 2.0
 """Refinement of the steps for the last fit, whose errors are left [-]."""
 
@@ -194,13 +197,13 @@ def _first(
 ) -> tuple[Refined, FloatArray]:
     """Return the fit from the first guess that leaves little, else the best; and the scales."""
     best, best_scales = None, np.empty(0)
-    coarse = replace(observed, refinement=COARSE)
+    coarse, every = replace(observed, refinement=COARSE), range(len(NAMES))
     for guess in guesses:
         scales = scales_of(observed, guess)
         starts = settled(coarse, guess, noise)
-        found = refine(coarse, guess, range(len(NAMES)), scales, noise, starts)
+        found = refine(coarse, guess, every, scales, noise, starts, ROUGH)
         starts = settled(coarse, found.parameters, found.spread, found.starts)
-        found = refine(coarse, found.parameters, range(len(NAMES)), scales, noise, starts)
+        found = refine(coarse, found.parameters, every, scales, noise, starts, ROUGH)
         if best is None or found.around.cost < best.around.cost:
             best, best_scales = found, scales
         if (best.spread < LITTLE * noise).all():

@@ -92,11 +92,52 @@ class Forcing(NamedTuple):
     turning: FloatArray | None = None
 
 
-class _Flow(NamedTuple):
+class Flow(NamedTuple):
     """Transition (P, 4, 4), and what forces at the start, middle and end add (P, 4, 3)."""
 
     transition: FloatArray
     forced: FloatArray
+
+
+class Stages(NamedTuple):
+    """
+    How the velocity of link n-1 is predicted in a step, at its start, in its middle, at its end.
+
+    Attributes
+    ----------
+    by_state, by_forces
+        Without friction, shapes (P, 3, 4) and (P, 3, 3).
+    middle_by_first, last_by_first, last_by_second
+        What the shares of friction, in the order of the stages, take from later velocities in
+        units of COULOMB_VELOCITY, shape (P, 1) [-].
+
+    """
+
+    by_state: FloatArray
+    by_forces: FloatArray
+    middle_by_first: FloatArray
+    last_by_first: FloatArray
+    last_by_second: FloatArray
+
+    @classmethod
+    def of(cls, models: FloatArray, step: float, whole: Flow) -> 'Stages':
+        """Return those of models and a step [s], whose flow over the whole step is known."""
+        half = linear_flow(models, step / 2)
+        rate = np.broadcast_to(np.eye(STATES)[2], (len(models), STATES))
+        by_forces = np.zeros((len(models), 3, 3))
+        # Half a step spans a force, the mean of that and the next one, and the next one.
+        first, middle, last = half.forced[:, 2].T
+        by_forces[:, 1, 0], by_forces[:, 1, 1] = first + middle / 2, middle / 2 + last
+        by_forces[:, 2] = whole.forced[:, 2]
+        scale = models[:, COULOMB] / COULOMB_VELOCITY
+        first, middle, last = whole.forced[:, 2].T * scale
+        # To the middle with the friction of the start, to the end with that of the middle.
+        taken = half.forced[:, 2].sum(axis=1) * scale, first - last, middle + 2 * last
+        return cls(
+            np.stack((rate, half.transition[:, 2], whole.transition[:, 2]), axis=1),
+            by_forces,
+            *(column[:, None] for column in taken),
+        )
 
 
 def step_for(parameters: FloatArray, has_friction: bool) -> float:
@@ -130,7 +171,17 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
         States, shape (K + 1, models, 4, segments).
 
     """
-    whole = _linear_flow(models, forcing.step)
+    return motions(models, starts, forcing)[:, :, :STATES]
+
+
+def motions(models: FloatArray, starts: FloatArray, forcing: Forcing) -> FloatArray:
+    """
+    Return the same with the shares of Coulomb friction in the stages of each step behind it.
+
+    Shape (K + 1, models, 7, segments), or (K + 1, models, 4, segments) if no model has any; those
+    of the last state, from which no step is taken, mean nothing.
+    """
+    whole = linear_flow(models, forcing.step)
     # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
     drag = models[:, VISCOUS, None] * forcing.base
     forces = forcing.effort[:, forcing.variant] + drag
@@ -138,11 +189,11 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
     if forcing.turning is not None:
         taken = models[:, IMBALANCE, None] * forcing.turning[:, :, None]
         forces = forces - taken[:, 0]
-        last = _linear_flow(models, forcing.step, on_last=True)
-        turned = last.forced @ _triples(-taken[:, 1])
+        last = linear_flow(models, forcing.step, on_last=True)
+        turned = last.forced @ triples(-taken[:, 1])
     if models[:, COULOMB].any():
         return _with_friction(starts, forces, turned, models, forcing, whole)
-    pushed = whole.forced @ _triples(forces)
+    pushed = whole.forced @ triples(forces)
     if turned is not None:
         pushed += turned
     states = np.empty((len(pushed) + 1, *starts.shape))
@@ -152,12 +203,12 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
     return states
 
 
-def _triples(forces: FloatArray) -> FloatArray:
-    """Return the forces at start, middle and end of every step, shape (K, models, 3, segments)."""
-    return np.stack((forces[:-2:2], forces[1:-1:2], forces[2::2]), axis=-2)
+def triples(halves: FloatArray) -> FloatArray:
+    """Return values at half steps (2 K + 1, a, b) for start, middle and end, (K, a, 3, b)."""
+    return np.stack((halves[:-2:2], halves[1:-1:2], halves[2::2]), axis=-2)
 
 
-def _linear_flow(models: FloatArray, step: float, *, on_last: bool = False) -> _Flow:
+def linear_flow(models: FloatArray, step: float, *, on_last: bool = False) -> Flow:
     """Return how states, and forces on link n-1 or on the last one, act a step later."""
     link, last = models[:, BOTH] - models[:, LAST], models[:, LAST]
     coupling = models[:, IMBALANCE] if models.shape[1] > IMBALANCE else np.zeros(len(models))
@@ -189,7 +240,7 @@ def _linear_flow(models: FloatArray, step: float, *, on_last: bool = False) -> _
         4 / step * slope - 8 / step**2 * bend,
         -slope / step + 4 / step**2 * bend,
     )
-    return _Flow(flow[:, :, :STATES], np.stack(forced, axis=-1))
+    return Flow(flow[:, :, :STATES], np.stack(forced, axis=-1))
 
 
 def _exponential(matrices: FloatArray) -> FloatArray:
@@ -208,7 +259,7 @@ def _with_friction(
     turned: FloatArray | None,
     models: FloatArray,
     forcing: Forcing,
-    whole: _Flow,
+    whole: Flow,
 ) -> FloatArray:
     """
     Return the states one by one; velocities for Coulomb friction are predicted in stages.
@@ -217,33 +268,27 @@ def _with_friction(
     in its middle and at its end. One product takes it a step further, where the last three become
     what the velocities of link n-1 would be without the friction of that step.
     """
-    half = _linear_flow(models, forcing.step / 2)
-    rate = np.broadcast_to(np.eye(STATES)[2], (len(models), STATES))
-    stages = np.stack((rate, half.transition[:, 2], whole.transition[:, 2]), axis=1)
-    coulomb = models[:, COULOMB, None]
-    step = np.concatenate((whole.transition, -whole.forced * coulomb[..., None]), axis=-1)
-    flow = np.concatenate((step, stages @ step / COULOMB_VELOCITY), axis=1)
+    stages = Stages.of(models, forcing.step, whole)
+    step = np.concatenate(
+        (whole.transition, -whole.forced * models[:, COULOMB, None, None]), axis=-1
+    )
+    flow = np.concatenate((step, stages.by_state @ step / COULOMB_VELOCITY), axis=1)
     rows = np.empty((len(forces) // 2 + 1, len(models), STATES + 3, starts.shape[-1]))
-    _force(rows, starts, forces, turned, forcing.base, (stages, whole.forced, half.forced))
-    scale = coulomb / COULOMB_VELOCITY
-    by_half = half.forced[:, 2].sum(axis=1)[:, None] * scale
-    by_first, by_middle, by_last = (column[:, None] * scale for column in whole.forced[:, 2].T)
-    by_start, by_second = by_first - by_last, by_middle + 2 * by_last
+    _force(rows, starts, forces, turned, forcing.base, stages, whole.forced)
     before, carried = None, np.empty_like(rows[0])
     for row in rows:
         if before is not None:
             np.matmul(flow, before, out=carried)
             row += carried
-        # To the middle with the friction of the start, to the end with that of the middle.
         held, second, last = row[:, 4], row[:, 5], row[:, 6]
         np.tanh(held, out=held)
-        second -= by_half * held
+        second -= stages.middle_by_first * held
         np.tanh(second, out=second)
-        last -= by_start * held
-        last -= by_second * second
+        last -= stages.last_by_first * held
+        last -= stages.last_by_second * second
         np.tanh(last, out=last)
         before = row
-    return rows[:, :, :STATES]
+    return rows
 
 
 def _force(
@@ -252,28 +297,25 @@ def _force(
     forces: FloatArray,
     turned: FloatArray | None,
     base: FloatArray,
-    flows: tuple[FloatArray, FloatArray, FloatArray],
+    stages: Stages,
+    whole: FloatArray,
 ) -> None:
     """Fill in what forces and base add to rows of `_with_friction`, and the whole first row."""
-    stages, whole, half = flows
-    # Half a step spans a force, the mean of that and the next one, and the next one.
-    to_middle = np.stack((half[:, 2, 0] + half[:, 2, 1] / 2, half[:, 2, 1] / 2 + half[:, 2, 2]))
+    by_state, ahead = stages.by_state, stages.by_forces
     # The velocities of a step take the forces of that step too: five at half steps, two in common.
     by_forces = np.zeros((len(whole), STATES + 3, 5))
     by_forces[:, :STATES, :3] = whole
-    by_forces[:, STATES:, :3] = stages @ whole
-    ahead = np.zeros((len(whole), 3, 3))
-    ahead[:, 1, :2], ahead[:, 2] = to_middle.T, whole[:, 2]
+    by_forces[:, STATES:, :3] = by_state @ whole
     by_forces[:, STATES:, 2:] += ahead
     # After the last step there is nothing ahead, and none of it is looked at.
     padded = np.concatenate((forces, np.zeros((2, *forces.shape[1:]))))
     windows = np.stack([padded[j : len(padded) - 4 + j : 2] for j in range(5)], axis=-2)
     np.matmul(by_forces, windows, out=rows[1:])
     rows[0, :, :STATES] = starts
-    rows[0, :, STATES:] = stages @ starts + ahead @ windows[0, :, :3]
+    rows[0, :, STATES:] = by_state @ starts + ahead @ windows[0, :, :3]
     if turned is not None:
         rows[1:, :, :STATES] += turned
-        rows[1:, :, STATES:] += stages @ turned
+        rows[1:, :, STATES:] += by_state @ turned
         rows[:-1, :, STATES + 2] += turned[:, :, 2]
     past = np.concatenate((base, np.zeros((2, *base.shape[1:]))))
     rows[:, :, STATES:] -= np.stack((past[:-2:2], past[1:-1:2], past[2::2]), axis=2)

@@ -22,6 +22,7 @@ grow with nothing but the number of segments.
 """
 
 from collections.abc import Iterator, Sequence
+from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
@@ -37,7 +38,7 @@ from flat_planner_ros.core.model_fit.simulation import (
     CHANNELS,
     first_starts,
     Observed,
-    seen_of,
+    seen_with_slopes,
 )
 import numpy as np
 import numpy.typing as npt
@@ -45,14 +46,14 @@ import numpy.typing as npt
 DIFFERENCE = 1e-6
 """Step of the difference quotients, relative to the parameters' scales [-]."""
 
-UNIT_DIFFERENCE = 1e-3
-"""The same for errors of the base, relative to those expected [-]."""
-
 MOST_STEPS = 40
 """Largest number of linearisations."""
 
-CONVERGED = 1e-4
+CONVERGED = 5e-3
 """Largest last step, relative to the standard errors of white noise [-]."""
+
+IN_VAIN = 0.05
+"""Step that, refused, is the last one, relative to them: next to nothing would be gained [-]."""
 
 SMALLEST = 1e-7
 """Last step that is always small enough, relative to the scales [-]."""
@@ -222,18 +223,22 @@ def refine(
     scales: FloatArray,
     spread: FloatArray,
     starts: FloatArray | None = None,
+    converged: float = CONVERGED,
 ) -> Refined:
     """
     Return the parameters with the least sum of squares (Levenberg and Marquardt).
 
-    Parameters are as for `linearised`; without starts those measured are taken.
+    Parameters are as for `linearised`; without starts those measured are taken. The last step is
+    at most `converged` standard errors of white noise.
     """
     point = parameters.copy(), first_starts(observed) if starts is None else starts
     best = linearised(observed, *point, free, scales, spread)
     damping = 0.0
     for _ in range(MOST_STEPS):
         step = _step(best, damping, scales[list(free)])
-        if _is_small(step, best, scales[list(free)]) or damping > MOST_DAMPING:
+        length = _in_errors(step, best)
+        is_small = length < converged or float(np.abs(step / scales[list(free)]).max()) < SMALLEST
+        if is_small or damping > MOST_DAMPING:
             break
         trial = _stepped(point, best, step, free)
         # A model that a bad step makes unstable leaves all bounds, and is refused by its cost.
@@ -242,6 +247,8 @@ def refine(
         is_better = there.cost <= best.cost * (1.0 + 1e-12)
         if is_better:
             point, best, damping = trial, there, damping / 10 if damping > 1e-6 else 0.0
+        elif length < IN_VAIN:
+            break
         else:
             damping = max(10 * damping, 1e-4)
     samples = sum(map(len, best.residuals))
@@ -280,12 +287,11 @@ def _stepped(
     return parameters, point[1] + moved
 
 
-def _is_small(step: FloatArray, around: Linearisation, scales: FloatArray) -> bool:
-    """Tell a step that changes nothing of interest."""
-    normal = around.normal.sum(axis=0)
+def _in_errors(step: FloatArray, around: Linearisation) -> float:
+    """Return the length of a step in standard errors of white noise [-]."""
     samples = CHANNELS * sum(map(len, around.residuals))
-    in_errors = float(step @ normal @ step) / (around.cost / samples + 1e-300)
-    return in_errors < CONVERGED**2 or float(np.abs(step / scales).max()) < SMALLEST
+    gain = float(step @ around.normal.sum(axis=0) @ step)
+    return sqrt(gain / (around.cost / samples + 1e-300))
 
 
 def _segments(
@@ -296,20 +302,12 @@ def _segments(
     scales: FloatArray,
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
     """Yield for each segment misfit (m, 2) and its derivatives (m, 2, own) and (m, 2, free)."""
-    own = starts.shape[1]
-    by_own = np.full(own, UNIT_DIFFERENCE)
-    by_own[:STATES] = DIFFERENCE
     nudges = DIFFERENCE * scales[list(free)]
-    models = np.tile(parameters, (1 + own + len(free), 1))
-    models[1 + own + np.arange(len(free)), list(free)] += nudges
+    models = np.tile(parameters, (1 + len(free), 1))
+    models[1 + np.arange(len(free)), list(free)] += nudges
     for block in blocks(observed):
-        begun = np.tile(starts[block].T, (len(models), 1, 1))
-        begun[1 : 1 + own] += np.diag(by_own)[:, :, None]
-        seen = seen_of(observed, block, models, begun)
-        for segment, angles in zip(observed.segments[block], seen, strict=True):
-            middle = angles[:, :1]
-            slopes = (angles[:, 1:] - middle).transpose(0, 2, 1)
-            by_start = slopes[:, :, :own] / by_own
-            by_parameter = slopes[:, :, own:] / nudges
+        seen = seen_with_slopes(observed, block, models, starts[block])
+        for segment, (angles, by_own) in zip(observed.segments[block], seen, strict=True):
+            by_parameter = (angles[..., 1:] - angles[..., :1]) / nudges
             measured = observed.angles[segment.first : segment.last]
-            yield middle[:, 0] - measured, by_start, by_parameter
+            yield angles[..., 0] - measured, by_own, by_parameter

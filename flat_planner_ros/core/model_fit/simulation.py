@@ -21,6 +21,7 @@ grows with neither.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.base_errors import BaseErrors
@@ -29,11 +30,13 @@ from flat_planner_ros.core.model_fit.last_links import (
     DELAY,
     Forcing,
     IMBALANCE,
+    motions,
     OFFSET,
     STATES,
     step_for,
     trajectories,
 )
+from flat_planner_ros.core.model_fit.sensitivity import carried_on, step_slopes
 from flat_planner_ros.core.model_fit.signals import between, hermite, interpolated, Segment
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +46,9 @@ BLOCK = 20
 
 CHUNK = 256
 """Steps whose states are held at a time: memory does not grow with the recording."""
+
+SHORTEST_CHUNK, MOST_SLOPES = 32, 200_000
+"""Steps that are worth their overhead, and derivatives of states that are held at a time [-]."""
 
 CHANNELS = 2
 """Angle of link n-1 and of the passive joint."""
@@ -123,55 +129,132 @@ def blocks(observed: Observed) -> Iterator[slice]:
 
 
 def seen_of(
-    observed: Observed, block: slice, models: FloatArray, unknowns: FloatArray
+    observed: Observed, block: slice, models: FloatArray, starts: FloatArray
 ) -> list[FloatArray]:
     """
-    Return for each segment what the sensors would show of every model, (m, models, 2) [rad].
+    Return for each segment what the sensors would show of every model, (m, 2, models) [rad].
 
     Parameters
     ----------
     observed
-        What was measured.
+        What was measured; the velocity of its base counts as true.
     block
         The segments to simulate.
     models
         Parameters in the order of `last_links.NAMES`, shape (models, 8).
-    unknowns
-        Starts, and what the base is off, shape (models, 4 or `observed.unknowns`, segments).
+    starts
+        Shape (models, 4, segments).
 
     """
-    t, segments = observed.times, observed.segments[block]
-    begins = t[[segment.first for segment in segments]]
-    longest = max(float(t[s.last - 1] - t[s.first]) for s in segments)
-    step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
-    steps = int(np.ceil(longest / step)) + 1
-    elapsed = [t[s.first : s.last] - begin for s, begin in zip(segments, begins, strict=True)]
-    seen = [np.empty((each.size, len(models), CHANNELS)) for each in elapsed]
-    starts = unknowns[:, :STATES]
-    for first in range(0, steps, CHUNK):
-        last = min(first + CHUNK, steps)
-        grid = begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
-        forcing = _forcing(observed, models, grid, step)
-        if observed.base_errors is not None and unknowns.shape[1] > STATES:
-            errors = observed.base_errors.of(block).at(grid, unknowns[:, STATES:])
-            forcing = forcing._replace(base=forcing.base + errors)
-        states = trajectories(models, starts, forcing)
+    samples = _Samples.of(observed, block)
+    seen = samples.empty(len(models))
+    for chunk in _chunks(observed, samples, models, CHUNK):
+        states = trajectories(models, starts, chunk.forcing)
         starts = states[-1]
-        for number, angles in enumerate(seen):
-            inside = slice(*np.searchsorted(elapsed[number] / step, (first, last)))
-            share = elapsed[number][inside] / step - first
-            angles[inside] = _between_states(states[..., number], share, step)
+        samples.read(seen, chunk, states.transpose(3, 0, 2, 1))
     for angles in seen:
-        angles[..., 1] += models[:, OFFSET]
+        angles[:, 1] += models[:, OFFSET]
     return seen
 
 
+def seen_with_slopes(
+    observed: Observed, block: slice, models: FloatArray, unknowns: FloatArray
+) -> list[tuple[FloatArray, FloatArray]]:
+    """
+    Return the same, from one start, and the derivatives of the first model's by the unknowns.
+
+    Parameters
+    ----------
+    observed, block, models
+        As for `seen_of`.
+    unknowns
+        Start of each segment, and what the base is off, shape (segments, 4 or
+        `observed.unknowns`).
+
+    Returns
+    -------
+    list[tuple[FloatArray, FloatArray]]
+        Of each segment, shapes (m, 2, models) and (m, 2, unknowns).
+
+    """
+    samples = _Samples.of(observed, block)
+    own = unknowns.shape[1]
+    seen, slopes = samples.empty(len(models)), samples.empty(own)
+    errors = None if observed.base_errors is None else observed.base_errors.of(block)
+    starts = np.broadcast_to(unknowns[:, :STATES].T, (len(models), STATES, len(unknowns)))
+    begun = np.broadcast_to(np.eye(STATES, own), (len(unknowns), STATES, own))
+    length = min(CHUNK, max(SHORTEST_CHUNK, MOST_SLOPES // (own * len(unknowns))))
+    for chunk in _chunks(observed, samples, models, length):
+        forcing, by_base = chunk.forcing, None
+        if errors is not None and own > STATES:
+            off = errors.at(chunk.grid, unknowns.T[None, STATES:])
+            forcing = forcing._replace(base=forcing.base + off)
+            by_base = errors.slopes(chunk.grid)
+        motion = motions(models, starts, forcing)
+        by_step = step_slopes(models[:1], motion[:, 0], forcing.step)
+        by_unknown = carried_on(by_step, begun, by_base)
+        starts, begun = motion[-1, :, :STATES], by_unknown[-1]
+        samples.read(seen, chunk, motion[:, :, :STATES].transpose(3, 0, 2, 1))
+        samples.read(slopes, chunk, by_unknown.swapaxes(0, 1))
+    for angles in seen:
+        angles[:, 1] += models[:, OFFSET]
+    return list(zip(seen, slopes, strict=True))
+
+
+class _Chunk(NamedTuple):
+    """Steps first ... last-1, half of them on a grid (2 K + 1, segments) [s], and what moves."""
+
+    first: int
+    last: int
+    grid: FloatArray
+    forcing: Forcing
+
+
+class _Samples(NamedTuple):
+    """When each segment of a block begins (segments,) [s], and its samples since then (m,) [s]."""
+
+    begins: FloatArray
+    elapsed: list[FloatArray]
+
+    @classmethod
+    def of(cls, observed: Observed, block: slice) -> '_Samples':
+        """Return those of a block of segments."""
+        t, segments = observed.times, observed.segments[block]
+        begins = t[[segment.first for segment in segments]]
+        pairs = zip(segments, begins, strict=True)
+        return cls(begins, [t[s.first : s.last] - begin for s, begin in pairs])
+
+    def empty(self, count: int) -> list[FloatArray]:
+        """Return room for so many numbers at each sample of both channels, (m, 2, count)."""
+        return [np.empty((each.size, CHANNELS, count)) for each in self.elapsed]
+
+    def read(self, seen: list[FloatArray], chunk: _Chunk, states: FloatArray) -> None:
+        """Fill in both angles of the samples in a chunk, from states (segments, K + 1, 4, ...)."""
+        step = chunk.forcing.step
+        for angles, each, own in zip(seen, self.elapsed, states, strict=True):
+            inside = slice(*np.searchsorted(each / step, (chunk.first, chunk.last)))
+            angles[inside] = _between_states(own, each[inside] / step - chunk.first, step)
+
+
+def _chunks(
+    observed: Observed, samples: _Samples, models: FloatArray, length: int
+) -> Iterator[_Chunk]:
+    """Yield the steps of a block of segments, so many at a time."""
+    longest = max(float(each[-1]) for each in samples.elapsed)
+    step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
+    steps = int(np.ceil(longest / step)) + 1
+    for first in range(0, steps, length):
+        last = min(first + length, steps)
+        grid = samples.begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
+        yield _Chunk(first, last, grid, _forcing(observed, models, grid, step))
+
+
 def _between_states(states: FloatArray, at: FloatArray, step: float) -> FloatArray:
-    """Return both angles between states (K + 1, models, 4) at times [steps], (m, models, 2)."""
+    """Return both angles between states (K + 1, 4, ...) at times [steps], shape (m, 2, ...)."""
     node = at.astype(int)
     share = (at - node)[:, None, None]
     here, there = states[node], states[node + 1]
-    ends = here[..., :2], there[..., :2], here[..., 2:], there[..., 2:]
+    ends = here[:, :2], there[:, :2], here[:, 2:], there[:, 2:]
     return hermite(share, np.array(step), *ends)
 
 

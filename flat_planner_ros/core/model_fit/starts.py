@@ -127,9 +127,9 @@ def _around(
     segments = observed.segments[block]
     costs, slopes, gradients = np.empty(starts.shape[:2]), [], []
     for number, (segment, angles) in enumerate(zip(segments, seen, strict=True)):
-        misfit = (angles - observed.angles[segment.first : segment.last, None]) / spread
-        each = misfit.reshape(len(angles), count, len(nudges), -1).transpose(1, 2, 0, 3)
-        flat = each.reshape(count, len(nudges), -1)
+        measured = observed.angles[segment.first : segment.last, :, None]
+        misfit = (angles - measured) / spread[:, None]
+        flat = misfit.reshape(-1, count, len(nudges)).transpose(1, 2, 0)
         columns = (flat[:, 1:] - flat[:, :1]) / DIFFERENCE
         costs[number] = (flat[:, 0] ** 2).sum(axis=-1)
         slopes.append(columns @ columns.transpose(0, 2, 1))
