@@ -15,7 +15,13 @@
 """Session: goals and measurements in, motions and verdicts out, in the order of time."""
 
 from flat_planner_ros.core.session.execution import Astray, clock_fault, Ended, Outcome, Shortfall
-from flat_planner_ros.core.session.goal import check_point_count, Goal, GoalPoint, MAX_ANGLE
+from flat_planner_ros.core.session.goal import (
+    check_point_count,
+    Goal,
+    GoalPoint,
+    MAX_ANGLE,
+    MAX_POINTS,
+)
 from flat_planner_ros.core.session.path_goal import path_goal
 from flat_planner_ros.core.session.session import PlannerSession
 from flat_planner_ros.core.session.settings import (
@@ -36,6 +42,7 @@ __all__ = [
     'Goal',
     'GoalPoint',
     'MAX_ANGLE',
+    'MAX_POINTS',
     'Motion',
     'Outcome',
     'path_goal',

@@ -17,7 +17,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.monitor import AdoptionRefused, ModelTuner
 from flat_planner_ros.ros.nodes.node_log import NodeLog
@@ -26,6 +26,7 @@ from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.parameters.row import Values
 from flat_planner_ros.ros.parameters.saved_model import model_file, NotSaved, save
 from flat_planner_ros.ros.wire import estimates, interfaces
+from flat_planner_ros.ros.wire.status_writer import Status
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
@@ -55,7 +56,7 @@ class ModelAdoption:
         log: NodeLog,
         settings: Callable[[], PlannerSettings],
         last_start: Callable[[], float | None],
-        announce: Callable[[DiagnosticStatus], None],
+        announce: Callable[[Status], None],
         values: Callable[[], Values],
     ) -> None:
         self._node = node
@@ -98,7 +99,7 @@ class ModelAdoption:
             response.success = False
         return response
 
-    def _adopt(self) -> DiagnosticStatus:
+    def _adopt(self) -> Status:
         """Set the parameters of the model to the last estimate, for the next plan."""
         session = self._settings().session
         adoption = self._tuner.propose(session.arm, session.joints[-1])

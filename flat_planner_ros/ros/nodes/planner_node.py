@@ -44,6 +44,7 @@ from flat_planner_ros.ros.parameters.planner import build, PlannerSettings, ROWS
 from flat_planner_ros.ros.wire import conversions, diagnostics, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.message_types import UnknownType
+from flat_planner_ros.ros.wire.status_writer import Status
 from flat_planner_ros.ros.wire.verdict_text import log_line, values_of
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -215,7 +216,7 @@ class PlannerNode(GuardedNode):
             if self._actions is not None:
                 self._actions.ended(ended, values_of(status), status.message)
 
-    def _answer(self, read: Read, tell: Tell = tell_nobody) -> DiagnosticStatus:
+    def _answer(self, read: Read, tell: Tell = tell_nobody) -> Status:
         """Give a goal exactly one verdict, and tell it; carry the goal out if it is accepted."""
         goal = motion = None
         started = perf_counter()
@@ -246,7 +247,7 @@ class PlannerNode(GuardedNode):
 
     def _internal_error(
         self, error: Exception, goal: Goal | None, motion: Motion | None
-    ) -> DiagnosticStatus:
+    ) -> Status:
         """Refuse a goal that could not be worked on; nobody may have heard of its motion."""
         message = f'internal error: {error!r}'
         self._log.error(message)
@@ -265,7 +266,7 @@ class PlannerNode(GuardedNode):
         self._sent_start = track.start
         self._outlet.publish(track, self._settings)
 
-    def _publish_status(self, status: DiagnosticStatus) -> None:
+    def _publish_status(self, status: Status) -> None:
         """Publish and log a verdict."""
         self._status.publish(diagnostics.array_of(status, self._now()))
         say = {

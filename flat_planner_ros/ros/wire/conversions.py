@@ -32,6 +32,7 @@ from flat_planner_ros.core.planning import PlanSamples, Reason, RequestRejected
 from flat_planner_ros.core.session import check_point_count, Goal, GoalPoint, Track
 from flat_planner_ros.ros.wire import stamps
 from flat_planner_ros.ros.wire.command_form import CommandForm, WHOLE
+from flat_planner_ros.ros.wire.goal_reader import read_goal
 from flat_planner_ros.ros.wire.point_reader import (
     FIELDS,
     joints_in_words,
@@ -105,6 +106,10 @@ def goal_from_trajectory(data: bytes) -> Goal:
         The bytes are no trajectory, or one with more bytes or points than any goal may have.
 
     """
+    _check_length(data)
+    goal = read_goal(data)
+    if goal is not None:
+        return goal
     msg = _goal_message(data, JointTrajectory)
     check_point_count(len(msg.points))
     return goal_of_trajectory(msg)
@@ -135,6 +140,7 @@ def goal_from_joint_state(data: bytes) -> Goal:
         The bytes are no joint state, or one with more bytes than any goal may have.
 
     """
+    _check_length(data)
     msg = _goal_message(data, JointState)
     point = GoalPoint(
         time=0.0,
@@ -145,8 +151,8 @@ def goal_from_joint_state(data: bytes) -> Goal:
     return Goal(joint_names=tuple(msg.name), points=(point,), stamp=_stamp(msg))
 
 
-def _goal_message(data: bytes, message_type: type[Message]) -> Message:
-    """Return a serialised goal as a message, unless it is longer than any goal may be."""
+def _check_length(data: bytes) -> None:
+    """Refuse a serialised goal that is longer than any goal may be."""
     # A message with a hundred thousand points takes seconds to become Python objects; its length
     # tells beforehand that it is no goal.
     if len(data) > MAX_GOAL_BYTES:
@@ -156,6 +162,10 @@ def _goal_message(data: bytes, message_type: type[Message]) -> Message:
             value=float(len(data)),
             limit=float(MAX_GOAL_BYTES),
         )
+
+
+def _goal_message(data: bytes, message_type: type[Message]) -> Message:
+    """Return a serialised goal as a message."""
     try:
         message: Message = deserialize_message(data, message_type)
     except RuntimeError as error:

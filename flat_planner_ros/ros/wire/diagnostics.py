@@ -17,7 +17,7 @@
 from collections.abc import Mapping, Sequence
 from math import isfinite
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.monitor import (
     LastLinks,
@@ -36,7 +36,8 @@ from flat_planner_ros.ros.wire.interfaces import (
     TRACKER_NAME,
 )
 from flat_planner_ros.ros.wire.prediction_values import left_by_imbalance, residual_values
-from flat_planner_ros.ros.wire.stamps import time_msg
+from flat_planner_ros.ros.wire.stamps import sec_and_nanosec
+from flat_planner_ros.ros.wire.status_writer import array_bytes, Pair, Status
 from flat_planner_ros.ros.wire.verdict_text import (
     clauses,
     clock_clause,
@@ -75,25 +76,15 @@ Values = Mapping[str, float | int | str | None]
 """Keys and values of a status; None for what is not known."""
 
 
-def array_of(status: DiagnosticStatus, now: float) -> DiagnosticArray:
-    """Return a message with one status, stamped now [s]."""
-    msg = DiagnosticArray(status=[status])
-    msg.header.stamp = time_msg(now)
-    return msg
+def array_of(status: Status, now: float) -> bytes:
+    """Return a serialised message with one status, stamped now [s]."""
+    return array_bytes(status, sec_and_nanosec(now))
 
 
-def status_msg(name: str, level: bytes, message: str, values: Values) -> DiagnosticStatus:
+def status_of(name: str, level: bytes, message: str, values: Values) -> Status:
     """Return a status; keys without a value are left out."""
-    return DiagnosticStatus(
-        name=name,
-        level=level,
-        message=message,
-        values=[
-            KeyValue(key=key, value=text_of(value))
-            for key, value in values.items()
-            if value is not None
-        ],
-    )
+    pairs = [Pair(key, text_of(value)) for key, value in values.items() if value is not None]
+    return Status(name=name, level=level, message=message, values=pairs)
 
 
 def accepted_status(
@@ -106,7 +97,7 @@ def accepted_status(
     with_baselines: bool = False,
     doubt: str = '',
     built: PlanarArm | None = None,
-) -> DiagnosticStatus:
+) -> Status:
     """
     Return the verdict on a goal that became a motion.
 
@@ -169,10 +160,10 @@ def accepted_status(
         level = DiagnosticStatus.WARN
         message += f'; stretched: as prescribed, {use.sentence(name)}'
         values.update(joint=name, value=use.value, limit=use.limit, time=use.time)
-    return status_msg(STATUS_NAME, level, message, {**values, **_goal_values(goal)})
+    return status_of(STATUS_NAME, level, message, {**values, **_goal_values(goal)})
 
 
-def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStatus:
+def rejected_status(error: RequestRejected, goal: Goal | None) -> Status:
     """Return the verdict on a goal that breaks a rule; None for one that was not even read."""
     values: Values = {
         'state': 'REJECTED',
@@ -185,50 +176,50 @@ def rejected_status(error: RequestRejected, goal: Goal | None) -> DiagnosticStat
         'duration_min': error.duration_min,
         **({} if goal is None else _goal_values(goal)),
     }
-    return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
+    return status_of(STATUS_NAME, DiagnosticStatus.ERROR, str(error), values)
 
 
-def with_clock(status: DiagnosticStatus, offset: float | None) -> DiagnosticStatus:
+def with_clock(status: Status, offset: float | None) -> Status:
     """Return a verdict that says how far ahead the stamps of joint states are [s], if notably."""
     clause = clock_clause(offset)
     if offset is None or not clause:
         return status
     status.message += f'; {clause}'
-    status.values.append(KeyValue(key='clock_offset', value=text_of(offset)))
+    status.values.append(Pair('clock_offset', text_of(offset)))
     if offset > 0.0 and status.level == DiagnosticStatus.OK:  # no network delivers ahead of time
         status.level = DiagnosticStatus.WARN
     return status
 
 
-def ended_status(ended: Ended, remark: str = '') -> DiagnosticStatus:
+def ended_status(ended: Ended, remark: str = '') -> Status:
     """Return the notice that a motion has ended, and how; a remark is for those that failed."""
     motion, outcome, shortfall, said = ended
     message = f'plan {motion.plan_id} {ENDINGS[outcome]}'
     values = _motion_values(motion, outcome.value)
     if shortfall is None:
         message = '; '.join(filter(None, (message, said)))
-        return status_msg(STATUS_NAME, DiagnosticStatus.OK, message, values)
+        return status_of(STATUS_NAME, DiagnosticStatus.OK, message, values)
     message = '; '.join(filter(None, (f'{message}: {shortfall.message}', said, remark)))
     values = {**values, **_shortfall_values(shortfall)}
-    return status_msg(STATUS_NAME, DiagnosticStatus.ERROR, message, values)
+    return status_of(STATUS_NAME, DiagnosticStatus.ERROR, message, values)
 
 
-def astray_status(astray: Astray) -> DiagnosticStatus:
+def astray_status(astray: Astray) -> Status:
     """Return the notice that the arm has left the motion under way."""
     motion, shortfall = astray
     values = {**_motion_values(motion, 'ASTRAY'), **_shortfall_values(shortfall)}
     message = f'plan {motion.plan_id} is not followed: {shortfall.message}'
-    return status_msg(STATUS_NAME, DiagnosticStatus.WARN, message, values)
+    return status_of(STATUS_NAME, DiagnosticStatus.WARN, message, values)
 
 
-def report_status(report: VibrationReport) -> DiagnosticStatus:
+def report_status(report: VibrationReport) -> Status:
     """Return what a motion has left behind."""
-    return status_msg(REPORT_NAME, LEVELS[report.level], report.message, _report_values(report))
+    return status_of(REPORT_NAME, LEVELS[report.level], report.message, _report_values(report))
 
 
 def monitor_status(
     report: VibrationReport | None, phase: str, dropped: int, clock_offset: float | None = None
-) -> DiagnosticStatus:
+) -> Status:
     """
     Return the present state of a monitor.
 
@@ -251,14 +242,14 @@ def monitor_status(
     }
     if report is None:
         message = f'{phase}: no motion has been judged yet'
-        return status_msg(REPORT_NAME, DiagnosticStatus.OK, message, state)
+        return status_of(REPORT_NAME, DiagnosticStatus.OK, message, state)
     message = f'{phase}; last motion: {report.message}'
-    return status_msg(
+    return status_of(
         REPORT_NAME, LEVELS[report.level], message, {**state, **_report_values(report)}
     )
 
 
-def tracker_status(tracker: Tracker, fault: str, seniority: str) -> DiagnosticStatus:
+def tracker_status(tracker: Tracker, fault: str, seniority: str) -> Status:
     """
     Return the present state of a tracker.
 
@@ -287,9 +278,9 @@ def tracker_status(tracker: Tracker, fault: str, seniority: str) -> DiagnosticSt
         'seniority': seniority,
     }
     if fault:
-        return status_msg(TRACKER_NAME, DiagnosticStatus.ERROR, f'{phase}; {fault}', values)
+        return status_of(TRACKER_NAME, DiagnosticStatus.ERROR, f'{phase}; {fault}', values)
     message = phase if error is None else f'{phase}, {error:.3g} rad from the plan'
-    return status_msg(TRACKER_NAME, DiagnosticStatus.OK, message, values)
+    return status_of(TRACKER_NAME, DiagnosticStatus.OK, message, values)
 
 
 def _report_values(report: VibrationReport) -> Values:

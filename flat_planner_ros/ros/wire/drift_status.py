@@ -18,11 +18,12 @@ from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from flat_planner_ros.core.monitor import ParameterDrift
-from flat_planner_ros.ros.wire.diagnostics import MODEL_KEYS, status_msg
+from flat_planner_ros.ros.wire.diagnostics import MODEL_KEYS, status_of
 from flat_planner_ros.ros.wire.interfaces import DRIFT_NAME
+from flat_planner_ros.ros.wire.status_writer import Status
 
 
-def drift_status(drifts: Sequence[ParameterDrift]) -> DiagnosticStatus:
+def drift_status(drifts: Sequence[ParameterDrift]) -> Status:
     """Return what of an arm wanders, by its estimates after at least 20 motions."""
     noticed = [drift for drift in drifts if drift.is_noticed]
     values: dict[str, float | int | str | None] = {
@@ -39,9 +40,9 @@ def drift_status(drifts: Sequence[ParameterDrift]) -> DiagnosticStatus:
         }
     if not noticed:
         message = f'no parameter wanders, as far as {values["motions"]} motions tell'
-        return status_msg(DRIFT_NAME, DiagnosticStatus.OK, message, values)
+        return status_of(DRIFT_NAME, DiagnosticStatus.OK, message, values)
     message = 'the arm ages: ' + '; '.join(drift.text for drift in noticed)
-    return status_msg(DRIFT_NAME, DiagnosticStatus.WARN, message, values)
+    return status_of(DRIFT_NAME, DiagnosticStatus.WARN, message, values)
 
 
 def _key(drift: ParameterDrift) -> str:

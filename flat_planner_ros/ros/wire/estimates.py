@@ -28,14 +28,15 @@ from flat_planner_ros.core.monitor import (
     ReportedEstimate,
     ReportedModel,
 )
-from flat_planner_ros.ros.wire.diagnostics import MODEL_KEYS, model_values, status_msg
+from flat_planner_ros.ros.wire.diagnostics import MODEL_KEYS, model_values, status_of
 from flat_planner_ros.ros.wire.interfaces import MODEL_NAME, REPORT_NAME
+from flat_planner_ros.ros.wire.status_writer import Status
 
 MOTION = 'motion'
 """Basis of an estimate from a whole motion."""
 
 
-def adopted_status(adoption: Adoption) -> DiagnosticStatus:
+def adopted_status(adoption: Adoption) -> Status:
     """Return the notice that the nominal model has changed."""
     estimate, former, arm = adoption.estimate, adoption.former, adoption.arm
     message = (
@@ -62,7 +63,7 @@ def adopted_status(adoption: Adoption) -> DiagnosticStatus:
     }
     if isinstance(estimate, ReportedModel):
         values.update(model_values(LastLinks.of(arm), estimate.stds))
-    return status_msg(MODEL_NAME, DiagnosticStatus.OK, message, values)
+    return status_of(MODEL_NAME, DiagnosticStatus.OK, message, values)
 
 
 def _std_of(estimate: Estimate, name: str) -> float:

@@ -73,8 +73,8 @@ def trajectory_bytes(
         left out at the end are empty.
 
     """
-    text = [LENGTH.pack(len(names)), *map(_string, names), LENGTH.pack(len(times))]
-    front = b''.join([ENCAPSULATION, STAMP.pack(*stamp), _string(''), *text])
+    text = [LENGTH.pack(len(names)), *map(string_bytes, names), LENGTH.pack(len(times))]
+    front = b''.join([ENCAPSULATION, STAMP.pack(*stamp), string_bytes(''), *text])
     # Every point but the first begins where one ends, hence they are all aligned alike.
     body = len(front) - len(ENCAPSULATION)
     widths = [table.shape[1] for table in tables] + [0] * (ARRAYS - len(tables))
@@ -97,7 +97,7 @@ def trajectory_bytes(
     return message.tobytes()
 
 
-def _string(text: str) -> bytes:
+def string_bytes(text: str) -> bytes:
     """Return a string, filled up to the alignment of the length that comes next."""
     encoded = text.encode() + bytes(1)
     return LENGTH.pack(len(encoded)) + encoded + bytes(-len(encoded) % LENGTH.size)

@@ -21,6 +21,7 @@ from flat_planner_ros.core import FlatPlannerError
 from flat_planner_ros.core.arm import InvalidCommand, InvalidRequest
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.ros.wire import conversions
+from flat_planner_ros.ros.wire.goal_reader import read_goal
 from flat_planner_ros.ros.wire.point_reader import FIELDS, read_points
 from flat_planner_ros.ros.wire.point_writer import trajectory_bytes
 from hypothesis import given, settings
@@ -130,6 +131,15 @@ def test_what_is_read_is_what_the_middleware_reads(msg):
         assert (read_points(data) is not None) == (len(lengths) == 1)
 
 
+@settings(max_examples=200, deadline=None, derandomize=True, database=None)
+@given(messages())
+def test_a_goal_is_what_the_middleware_reads(msg):
+    for data in (serialize_message(msg), big_endian(msg)):
+        expected = conversions.goal_of_trajectory(deserialize_message(data, JointTrajectory))
+        # As text: a number that is none equals nothing.
+        assert repr(read_goal(data)) == repr(expected)
+
+
 def usable(points=3):
     """Return a message that can be played."""
     values = np.linspace(0.0, 1.0, points).tolist()
@@ -176,8 +186,10 @@ def test_what_the_writer_writes_is_read(fields):
 def test_a_message_is_never_read_beyond_its_end():
     data = trajectory_bytes(['a', 'b'], (3, 5), np.arange(4.0), 4 * [np.ones((4, 2))])
     assert read_points(data) is not None
+    assert read_goal(data) is not None
     for end in range(len(data)):
         assert read_points(data[:end]) is None
+        assert read_goal(data[:end]) is None
 
 
 @settings(max_examples=500, deadline=None, derandomize=True, database=None)
@@ -203,6 +215,8 @@ def test_corrupted_bytes_are_read_alike_or_refused_in_one_sentence(data, changes
     else:
         points = conversions.points_of(corrupt)
         assert_same(points, conversions.points_of_message(expected))
+        goal = read_goal(corrupt)
+        assert goal is None or repr(goal) == repr(conversions.goal_of_trajectory(expected))
 
 
 @settings(max_examples=200, deadline=None, derandomize=True, database=None)
