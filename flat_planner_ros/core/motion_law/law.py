@@ -23,7 +23,7 @@ boundary layers and oscillations of exponentials.
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from math import ceil, log2
 from typing import Protocol, TYPE_CHECKING
@@ -53,6 +53,9 @@ RADIANS_PER_PANEL = 8.0
 
 NEGLIGIBLE_DECAY = 18.0
 """Natural logarithm of the decay from which the square of a term adds nothing to an integral."""
+
+QUADRATURES_KEPT = 16
+"""Sets of nodes that are remembered: goals alike share one, whatever their distance."""
 
 MAX_PANELS = 2048
 """Bound on the panels, reached by some thousand oscillations within one motion."""
@@ -214,17 +217,25 @@ def half_quadrature(rates: ComplexArray) -> tuple[FloatArray, FloatArray]:
         Normalised times x + 1 in (0, 1), and weights whose sum is 1, shape (m,) [-].
 
     """
-    edges = _panels(ceil(log2(np.abs(rates).max() + 1.0)) + 1)
+    depth = ceil(log2(np.abs(rates).max() + 1.0)) + 1
+    edges = _panels(depth)
     # A term may oscillate many times within its layer: split panels that it still reaches.
     is_alive = np.multiply.outer(edges[:-1], np.abs(rates.real)) < NEGLIGIBLE_DECAY
     turns = np.diff(edges) * np.where(is_alive, np.abs(rates), 0.0).max(axis=1)
     parts = 1.0 + np.floor(turns / RADIANS_PER_PANEL)
     counts = np.ceil(parts * min(1.0, MAX_PANELS / parts.sum())).astype(int)
-    widths = np.repeat(np.diff(edges) / counts, counts)
+    return _split_panels(depth, tuple(counts.tolist()))
+
+
+@lru_cache(maxsize=QUADRATURES_KEPT)
+def _split_panels(depth: int, parts: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights of panels that are split into a number of equal parts each."""
+    counts = np.array(parts)
+    widths = np.repeat(np.diff(_panels(depth)) / counts, counts)
     starts = np.cumsum(widths) - widths
     nodes, weights = gauss_panel()
     times = starts[:, None] + np.multiply.outer(widths, nodes)
-    return times.ravel(), np.multiply.outer(widths, weights).ravel()
+    return locked(times.ravel()), locked(np.multiply.outer(widths, weights).ravel())
 
 
 def motion_quadrature(

@@ -65,7 +65,7 @@ class CommandOutlet:
         )
 
     def publish(self, track: Track, settings: PlannerSettings) -> None:
-        """Publish what is to be carried out, the command first: its start is near."""
+        """Publish a command and a plan, the command first: its start is near."""
         joints = settings.session.joints
         plan = conversions.command_bytes(track, joints)
         if settings.session.execute:
@@ -77,6 +77,9 @@ class CommandOutlet:
             else:
                 self._controller.send(command)
         self._plan.publish(plan)
+
+    def publish_flat(self, track: Track) -> None:
+        """Publish the flat outputs of the same, for viewers: whatever is urgent goes first."""
         self._flat_plan.publish(conversions.flat_plan_bytes(track))
 
     def controllers(self) -> list[str]:
