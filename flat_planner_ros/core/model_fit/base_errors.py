@@ -148,7 +148,7 @@ def base_errors_of(
         longer = smoothing[1].span / smoothing[0].span - 1.0
         of_noise = np.interp(own[:, None] - own, lags, covariance)
         place[: own.size] = own
-        root[: own.size, : own.size] = _root(of_noise + np.diag(bias / longer**2))
+        root[: own.size, : own.size] = root_of(of_noise + np.diag(bias / longer**2))
     return BaseErrors(places, roots, spacing)
 
 
@@ -177,7 +177,7 @@ def _covariances(
     return lags, np.correlate(own, own, mode='full'), float(np.sum((other - own) ** 2))
 
 
-def _root(covariance: FloatArray) -> FloatArray:
+def root_of(covariance: FloatArray) -> FloatArray:
     """Return a square root of a covariance that may be singular."""
     variances, directions = np.linalg.eigh(covariance)
     root: FloatArray = directions * np.sqrt(np.maximum(variances, 0.0))

@@ -60,6 +60,9 @@ MOMENT_SHARE = 0.3
 TOLD = 0.3
 """Largest standard error of a parameter that counts as told, relative to its scale [-]."""
 
+NEGLIGIBLE = 0.01
+"""Scale of a friction that makes no difference, relative to the one it is solved with [-]."""
+
 CERTAIN = 3.0
 """Standard errors from its start value from which a parameter counts as told all the same [-]."""
 
@@ -178,7 +181,26 @@ def fit_first_links(
         other, _ = _solved(changed, chain, values, free, scales)
         whole += weight**2 * np.outer(other - values, other - values)
     misfit = _doubt(found, values, chain, noise_of(measurements), parts)
-    return FirstFit(values, free, whole, misfit)
+    sizes = _sizes(scales, values, believed)
+    stds = np.sqrt(np.diag(whole))
+    is_told = (stds <= TOLD * sizes) | (np.abs(values - believed) >= CERTAIN * stds)
+    told = [i for i in free if is_told[i]]
+    untold = np.setdiff1d(np.arange(values.size), told)
+    # The others keep what was found with these: what they lack is in the errors of the others.
+    values[untold] = believed[untold]
+    whole[untold] = whole[:, untold] = 0.0
+    return FirstFit(values, told, whole, misfit)
+
+
+def _sizes(scales: FloatArray, values: FloatArray, believed: FloatArray) -> FloatArray:
+    """Return what an error is compared with, shape (5 m,): inertia and friction themselves."""
+    sizes = scales.reshape(len(KINDS), -1).copy()
+    least = NEGLIGIBLE * sizes
+    known = np.maximum(np.abs(values), np.abs(believed)).reshape(sizes.shape)
+    friction = [VISCOUS, COULOMB]
+    sizes[friction] = np.maximum(known, least)[friction]
+    sizes[OWN] = np.abs(values).reshape(sizes.shape)[OWN]
+    return sizes.ravel()
 
 
 def _signals(

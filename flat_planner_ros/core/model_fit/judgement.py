@@ -17,6 +17,7 @@
 from collections.abc import Sequence
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.base_errors import root_of
 from flat_planner_ros.core.model_fit.refinement import Linearisation
 from flat_planner_ros.core.model_fit.simulation import CHANNELS
 import numpy as np
@@ -94,20 +95,33 @@ def covariance(around: Linearisation, scales: FloatArray) -> FloatArray:
     A sandwich of the normal equations, of three kinds, the largest error of each parameter
     counting: samples that err alike are one, by the mean autocorrelation; the scores as they are,
     with those of their neighbours (Newey and West 1987); and the rounding of encoders, one error
-    as long as they stand still, of which a few rests show less than there is.
+    as long as they stand still, of which a few rests show less than there is. All variances are
+    above zero, as sums of squares, also of parameters that are told only together.
 
     """
     size = np.outer(scales, scales)
     lengths = correlation_lengths(around)
-    prior = np.eye(scales.size) / FAR_PRIOR**2
-    inverse = np.linalg.inv(around.normal.sum(axis=0) * size + prior)
-    by_length = inverse @ (np.tensordot(lengths, around.normal, axes=1) * size + prior) @ inverse
+    inverse = _inverse(around.normal.sum(axis=0) * size + np.eye(scales.size) / FAR_PRIOR**2)
+    half = inverse @ root_of(np.tensordot(lengths, around.normal, axes=1) * size)
+    by_length = half @ half.T + inverse @ inverse / FAR_PRIOR**2
     by_scores = inverse @ (around.scatter * size) @ inverse
     by_rounding = inverse @ (around.rounding * size) @ inverse
     own = np.maximum(np.diag(by_scores), np.diag(by_rounding))
     larger = np.sqrt(np.maximum(own / np.diag(by_length), 1.0))
     result: FloatArray = by_length * np.outer(larger, larger)
     return result
+
+
+def _inverse(normal: FloatArray) -> FloatArray:
+    """Return the inverse of normal equations; a direction lost in rounding is not told at all."""
+    sizes = np.sqrt(np.diag(normal))
+    told, directions = np.linalg.eigh(normal / np.outer(sizes, sizes))
+    is_lost = told <= sizes.size * np.finfo(float).eps
+    # With nothing but the prior, seen from the parameter that is told best.
+    told = np.where(is_lost, (FAR_PRIOR * sizes.max(initial=1.0)) ** -2, told)
+    half = directions / np.sqrt(told) / sizes[:, None]
+    inverse: FloatArray = half @ half.T
+    return inverse
 
 
 def doubt(around: Linearisation, spread: FloatArray, noise: FloatArray, motion: FloatArray) -> str:

@@ -43,6 +43,7 @@ from flat_planner_ros.core.model_fit.last_links import (
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
 from flat_planner_ros.core.model_fit.observation import (
+    check_moves,
     noise_of_links,
     observed_of,
     with_base_errors,
@@ -117,6 +118,7 @@ def fit_last_links(
     """Fit the last two links; parameters and errors as for `fit_model`."""
     period = 2 * pi / start.natural_mode().frequency
     observed = observed_of(measurements, period)
+    check_moves(measurements)
     believed = vector_of(start)
     noise = np.maximum(noise_of_links(measurements), 1e-9)
     found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
@@ -232,9 +234,7 @@ def _told(
     free = list(range(len(NAMES)))
     while True:
         found = refine(observed, found.parameters, free, scales, found.spread, found.starts)
-        variances = np.diag(covariance(found.around, scales[free]))
-        # Of what is not told at all, rounding may make the variance negative.
-        ratio = np.sqrt(np.where(variances >= 0.0, variances, np.inf))
+        ratio = np.sqrt(np.diag(covariance(found.around, scales[free])))
         if not free or ratio.max() <= TOLD:
             return found, free
         # Parameters that only together are told have errors of one size.

@@ -50,6 +50,9 @@ SUDDEN = 0.3
 FEW = 0.02
 """Share of samples with such changes beyond which they are the rule [-]."""
 
+STANDS = 10.0
+"""Range of an angle that noise alone may have, in standard deviations: of 1e6 samples [-]."""
+
 LONGER = 1.6
 """Factor on the span of smoothed velocities, what comes of which shows what they cost [-]."""
 
@@ -85,6 +88,23 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
         segments=segments,
         turning=turning_of(measurements.positions[:, -1], rates[:, -2:], accelerations[:, -2:]),
     )
+
+
+def check_moves(measurements: Measurements) -> None:
+    """Refuse measurements in which joint n-1 stands still, or link n-1 but for noise."""
+    joint, count = measurements.joints - 1, measurements.times.size
+    if not np.ptp(measurements.positions[:, -2]):
+        raise InvalidRequest(
+            f'joint {joint} stands exactly still in all {count} measurements: only its own '
+            'motions tell the last two links; let it move, or check that its angle is recorded'
+        )
+    moved = float(np.ptp(measurements.positions[:, :-1].sum(axis=1)))
+    noise = float(noise_of_links(measurements)[0])
+    if moved < STANDS * noise:
+        raise InvalidRequest(
+            f'link {joint} moves by {moved:.2g} rad in all {count} measurements, no more than its '
+            f'noise of {noise:.2g} rad makes it: larger motions of joint {joint} are needed'
+        )
 
 
 def base_rate(measurements: Measurements, smoothing: Smoothing) -> FloatArray:

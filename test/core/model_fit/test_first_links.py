@@ -17,7 +17,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from flat_planner_ros.core.arm import PlanarArm
+from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit import fit_model, Measurements, Trust
 from flat_planner_ros.core.model_fit.first_fit import fit_first_links
 from flat_planner_ros.core.model_fit.first_links import (
@@ -146,6 +146,70 @@ def test_a_joint_that_never_moves_tells_nothing_of_itself():
     found, _ = directly(held_still, believed, true)
     assert not any(estimate.is_told for estimate, _ in found.values())
     assert found['inertia[1]'][0].value == pytest.approx(believed.inertia[0, 0])
+    # The last links are told by motions of joint n-1, whatever stands still before it.
+    for moves in ([1.0, 0.0, 1.0], [0.0, 0.0, 1.0]):
+        with pytest.raises(InvalidRequest, match='joint 2 stands exactly still'):
+            fit_model(replace(seen, positions=seen.positions * moves), believed)
+
+
+@pytest.mark.parametrize('noise', [0.0, 1e-5])
+def test_a_first_joint_that_is_held_fast_leaves_the_last_links_told(noise):
+    """The arm beyond joint 1, recorded on its own, with an encoder that shows nothing."""
+    believed, true = arms(1, 0.0, seed=4)
+    beyond = [
+        PlanarArm.reduced(
+            inertia_star=arm.inertia_star,
+            stiffness=arm.stiffness,
+            damping=arm.damping,
+            viscous_friction=arm.viscous_friction[1:],
+            coulomb_friction=arm.coulomb_friction[1:],
+        )
+        for arm in (true, believed)
+    ]
+    seen = recorded(*beyond, until=3.1, goals=GOALS[:2], noise=noise)
+    fast = Measurements(
+        times=seen.times,
+        positions=np.column_stack((0.0 * seen.times, seen.positions)),
+        efforts=np.column_stack((0.0 * seen.times, seen.efforts)),
+    )
+    fit = fit_model(fast, believed)
+    assert fit.misfit == ''
+    assert fit.arm.inertia_star == pytest.approx(true.inertia_star, rel=2e-3)
+    assert fit.arm.stiffness == pytest.approx(true.stiffness, rel=2e-3)
+    assert [e.name for e in fit.estimates[:6] if not e.is_told] == []
+    firsts = fit.estimates[8:]
+    assert not any(estimate.is_told for estimate in firsts)
+    assert all('would tell it' in estimate.remark for estimate in firsts)
+
+
+def test_friction_that_noise_hides_is_not_told():
+    """An error is not small because the effort is large: 151 % of the friction was told."""
+    believed, true = arms(5, EARTH, seed=1)
+    clean = held(true, believed, goals=GOALS)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(clean.positions.shape)
+    step = 2 * np.pi / 2**12
+    rounded = step * np.round((clean.positions + noise) / step)
+    found, misfit = directly(replace(clean, positions=rounded), believed, true)
+    assert misfit == ''
+    for name, (estimate, value) in found.items():
+        if 'friction' in name and estimate.is_told:
+            assert estimate.std <= 0.3 * abs(estimate.value), name
+            assert abs(estimate.value - value) < 4.0 * estimate.std, name
+    for name in ('viscous_friction[1]', 'viscous_friction[2]', 'coulomb_friction[1]'):
+        assert not found[name][0].is_told
+        assert found[name][0].value == found[name][0].std == 0.0
+    check_told(found, ['inertia[1]', 'inertia[5]', 'static_moment[1]'], 0.05)
+
+
+def test_no_friction_is_told_as_none():
+    believed, true = arms(1, EARTH, seed=2)
+    smooth = replace(true, viscous_friction=np.zeros(2), coulomb_friction=np.zeros(2))
+    seen = held(smooth, believed, noise=1e-5, goals=GOALS)
+    found, _ = directly(seen, believed, smooth)
+    for name in ('viscous_friction[1]', 'coulomb_friction[1]'):
+        estimate = found[name][0]
+        assert estimate.is_told
+        assert abs(estimate.value) < max(4.0 * estimate.std, 1e-5)
 
 
 def test_trusted_inertia_scales_the_first_links_too():

@@ -268,6 +268,11 @@ def test_what_tells_nothing_is_refused():
     step = np.outer(seen.times > 0.5, [2 * pi / 2**14, 0.0])
     with pytest.raises(InvalidRequest, match='joint 2 stands still'):
         fit_model(replace(seen, positions=step, efforts=0.0 * seen.efforts), BELIEVED)
+    moving = recorded(TRUE, BELIEVED, **SHORT)
+    noise = 1e-5 * np.random.default_rng(0).standard_normal(moving.positions.shape)
+    for shaken, said in ((0.0, 'joint 1 stands exactly still'), (noise, 'no more than its noise')):
+        with pytest.raises(InvalidRequest, match=said):
+            fit_model(replace(moving, positions=moving.positions * [0.0, 1.0] + shaken), BELIEVED)
     with pytest.raises(InvalidRequest, match='fewest'):
         Measurements(times=seen.times[:9], positions=seen.positions[:9], efforts=seen.efforts[:9])
     with pytest.raises(InvalidRequest, match='increase'):

@@ -195,3 +195,15 @@ def test_a_recording_without_efforts_is_refused_with_the_reason(tmp_path, capsys
     write(bag, with_efforts=False)
     assert identify.main(['identify', str(bag), '--params-file', str(SHIPPED)]) == 1
     assert 'with efforts' in capsys.readouterr().err
+
+
+def test_a_joint_that_stands_still_is_refused_with_the_reason(tmp_path, capsys):
+    seen = recorded(TRUE, BELIEVED, until=1.0)
+    table = tmp_path / 'run.csv'
+    data = np.column_stack((seen.times, 0.0 * seen.times, seen.positions[:, 1], seen.efforts))
+    names = 'time,joint1.position,joint2.position,joint1.effort'
+    np.savetxt(table, data, delimiter=',', header=names, comments='')
+    options = ['--params-file', str(SHIPPED), '-o', str(tmp_path / 'arm.yaml')]
+    assert identify.main(['identify', str(table), *options]) == 1
+    assert 'joint 1 stands exactly still' in capsys.readouterr().err
+    assert not (tmp_path / 'arm.yaml').exists()
