@@ -53,6 +53,9 @@ FEW = 0.02
 STANDS = 10.0
 """Range of an angle that noise alone may have, in standard deviations: of 1e6 samples [-]."""
 
+STILL = 1.05
+"""Spread of an angle that rests, in that of its noise [-]: motions of a third are hidden."""
+
 LONGER = 1.6
 """Factor on the span of smoothed velocities, what comes of which shows what they cost [-]."""
 
@@ -108,10 +111,10 @@ def check_moves(measurements: Measurements) -> None:
 
 
 def base_rate(measurements: Measurements, smoothing: Smoothing) -> FloatArray:
-    """Return the smoothed velocity of link n-2, shape (m,); with two joints nothing is there."""
-    if measurements.joints == 2:
-        return np.zeros(measurements.times.size)
+    """Return the smoothed velocity of link n-2, shape (m,): none with two joints, or at rest."""
     angle = measurements.positions[:, :-2].sum(axis=1, keepdims=True)
+    if float(angle.std()) <= STILL * smoothing.noise:
+        return np.zeros(measurements.times.size)
     return derivatives(measurements.times, angle, smoothing.span)[1][:, 0]
 
 

@@ -67,6 +67,17 @@ def arms(count, gravity, seed):
     return believed, true
 
 
+def beyond(arm):
+    """Return the last two links of an arm of three, as one of two."""
+    return PlanarArm.reduced(
+        inertia_star=arm.inertia_star,
+        stiffness=arm.stiffness,
+        damping=arm.damping,
+        viscous_friction=arm.viscous_friction[1:],
+        coulomb_friction=arm.coulomb_friction[1:],
+    )
+
+
 def first_estimates(fit, arm):
     """Return estimates of the first links with the true values, by name."""
     return {
@@ -156,17 +167,7 @@ def test_a_joint_that_never_moves_tells_nothing_of_itself():
 def test_a_first_joint_that_is_held_fast_leaves_the_last_links_told(noise):
     """The arm beyond joint 1, recorded on its own, with an encoder that shows nothing."""
     believed, true = arms(1, 0.0, seed=4)
-    beyond = [
-        PlanarArm.reduced(
-            inertia_star=arm.inertia_star,
-            stiffness=arm.stiffness,
-            damping=arm.damping,
-            viscous_friction=arm.viscous_friction[1:],
-            coulomb_friction=arm.coulomb_friction[1:],
-        )
-        for arm in (true, believed)
-    ]
-    seen = recorded(*beyond, until=3.1, goals=GOALS[:2], noise=noise)
+    seen = recorded(beyond(true), beyond(believed), until=3.1, goals=GOALS[:2], noise=noise)
     fast = Measurements(
         times=seen.times,
         positions=np.column_stack((0.0 * seen.times, seen.positions)),
@@ -180,6 +181,27 @@ def test_a_first_joint_that_is_held_fast_leaves_the_last_links_told(noise):
     firsts = fit.estimates[8:]
     assert not any(estimate.is_told for estimate in firsts)
     assert all('would tell it' in estimate.remark for estimate in firsts)
+
+
+@pytest.mark.parametrize('noise', [1e-4, 1e-3])
+def test_noise_of_a_first_joint_at_rest_does_not_turn_friction(noise):
+    """Second route: link n-1 of an arm of two, seen with the noise of both encoders."""
+    believed, true = arms(1, 0.0, seed=4)
+    pairs = [beyond(arm) for arm in (true, believed)]
+    seen = recorded(*pairs, until=3.1, goals=GOALS[:2], noise=noise)
+    first = noise * np.random.default_rng(9).standard_normal(seen.times.size)
+    alone = seen.positions + np.column_stack((first, 0.0 * first))
+    three = Measurements(
+        times=seen.times,
+        positions=np.column_stack((first, seen.positions)),
+        efforts=np.column_stack((0.0 * seen.times, seen.efforts)),
+    )
+    found = [estimate.value for estimate in fit_model(three, believed).estimates[:6]]
+    two = [
+        estimate.value
+        for estimate in fit_model(replace(seen, positions=alone), pairs[1]).estimates[:6]
+    ]
+    assert found == pytest.approx(two, rel=1e-4)
 
 
 def test_friction_that_noise_hides_is_not_told():
