@@ -21,7 +21,6 @@ from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, NaturalMod
 from flat_planner_ros.core.session.recent_states import Inputs, RecentStates
 from flat_planner_ros.core.session.settings import SessionSettings
 from flat_planner_ros.core.session.timeline import Motion, Timeline
-from flat_planner_ros.core.tracking import moving_start
 import numpy as np
 
 DERIVATIVE_STEP = 1e-4
@@ -93,6 +92,9 @@ def measured_start(
         Of the start, absolute [s].
 
     """
+    # Imported here: see `RecentStates.estimate`.
+    from flat_planner_ros.core.tracking import moving_start
+
     arm, drive = settings.arm, settings.options.drive
     inputs = Inputs(arm, drive, timeline.known)
     found = recent.estimate(arm, inputs, time)

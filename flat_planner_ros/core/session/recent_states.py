@@ -14,15 +14,20 @@
 
 """What the joints have done lately: the state of an arm in motion, and what it will be."""
 
+from __future__ import annotations
+
 from collections import deque
 from collections.abc import Iterable
 from math import tau
+from typing import TYPE_CHECKING
 
 from flat_planner_ros.core.arm import Drive, FloatArray, JointSample, PlanarArm
 from flat_planner_ros.core.planning import PlanSamples
 from flat_planner_ros.core.session.timeline import Motion
-from flat_planner_ros.core.tracking import ArmObserver, Estimate
 import numpy as np
+
+if TYPE_CHECKING:
+    from flat_planner_ros.core.tracking import Estimate
 
 KEPT = 4000
 """Samples that are kept: 2 s at the fastest rate."""
@@ -107,6 +112,9 @@ class RecentStates:
         None if less than half a swing has been seen, or if the passive joint stands beside its
         zero: no model explains that.
         """
+        # Imported here: a node starts sooner without it, and is to need it for a swing only.
+        from flat_planner_ros.core.tracking import ArmObserver
+
         frequency = arm.natural_mode(held=inputs.is_held).frequency
         swing = tau / frequency
         seen = self._since(MOST_SWINGS * swing)

@@ -36,7 +36,10 @@ LOADED = Event()
 FIT = 'flat_planner_ros.core.model_fit'
 """The wing that tells how an arm swings, and its whole model."""
 
-PLANNING = ('scipy.linalg.lapack', 'scipy.optimize', FIT)
+SWING = 'flat_planner_ros.core.tracking'
+"""The wing that tells how an arm moves from what it has done lately."""
+
+PLANNING = (SWING, 'scipy.linalg.lapack', 'scipy.optimize', FIT)
 """Modules that planning through via points, in motion or from a swing needs."""
 
 REPORTING = ('scipy.fft', 'scipy.integrate', 'scipy.optimize', FIT)

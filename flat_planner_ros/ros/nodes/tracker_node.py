@@ -34,6 +34,7 @@ from flat_planner_ros.ros.parameters.tracker import build, ROWS, TrackerNodeSett
 from flat_planner_ros.ros.wire import conversions, diagnostics, estimates, interfaces, stamps
 from flat_planner_ros.ros.wire.joint_states import JointStateReader
 from flat_planner_ros.ros.wire.tracked_motion import tracked_motion
+from flat_planner_ros.ros.wire.tracker_word import tracker_status
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -176,7 +177,7 @@ class TrackerNode(GuardedNode):
     def _introduce(self) -> None:
         """Publish the present state."""
         seniority = self._rivals.seniority
-        status = diagnostics.tracker_status(self._tracker, self._fault, seniority)
+        status = tracker_status(self._tracker, self._fault, seniority)
         status.hardware_id = self.get_fully_qualified_name()
         self._health.publish(diagnostics.array_of(status, self._now()))
 

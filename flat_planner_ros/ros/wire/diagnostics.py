@@ -28,12 +28,10 @@ from flat_planner_ros.core.monitor import (
 )
 from flat_planner_ros.core.planning import RequestRejected
 from flat_planner_ros.core.session import Astray, Ended, Goal, Motion, Outcome, Shortfall
-from flat_planner_ros.core.tracking import Phase, Tracker
 from flat_planner_ros.ros.wire.interfaces import (
     ERROR_CODES,
     REPORT_NAME,
     STATUS_NAME,
-    TRACKER_NAME,
 )
 from flat_planner_ros.ros.wire.prediction_values import left_by_imbalance, residual_values
 from flat_planner_ros.ros.wire.stamps import sec_and_nanosec
@@ -247,40 +245,6 @@ def monitor_status(
     return status_of(
         REPORT_NAME, LEVELS[report.level], message, {**state, **_report_values(report)}
     )
-
-
-def tracker_status(tracker: Tracker, fault: str, seniority: str) -> Status:
-    """
-    Return the present state of a tracker.
-
-    Parameters
-    ----------
-    tracker
-        What it does, its certificate, and how late it is.
-    fault
-        Why tracking was given up last, until the next command; empty if it was not.
-    seniority
-        Which efforts it sends, and since when it lives.
-
-    """
-    phase, certificate, ages = tracker.phase.value, tracker.certificate, tracker.ages
-    error = tracker.error if tracker.phase is Phase.TRACKING else None
-    values: Values = {
-        'phase': phase,
-        'error': error,
-        'decay_rate': certificate.decay_rate,
-        'margin': certificate.margin,
-        'bandwidth': certificate.bandwidth,
-        'most_late': certificate.late,
-        'age': ages.mean,
-        'oldest': ages.oldest,
-        'unanswered': ages.unanswered,
-        'seniority': seniority,
-    }
-    if fault:
-        return status_of(TRACKER_NAME, DiagnosticStatus.ERROR, f'{phase}; {fault}', values)
-    message = phase if error is None else f'{phase}, {error:.3g} rad from the plan'
-    return status_of(TRACKER_NAME, DiagnosticStatus.OK, message, values)
 
 
 def _report_values(report: VibrationReport) -> Values:
