@@ -117,21 +117,23 @@ def test_another_source_for_the_same_joints_is_found(graph):
 
 
 def test_several_robots_on_one_topic_are_fine(graph):
-    planner, _ = (graph.create(node_class) for node_class in (PlannerNode, PlantNode))
+    planner = graph.create(PlannerNode)
+    # So rarely that a busy planner hears the other one, too.
+    graph.create(PlantNode, {'publish_rate': 10.0})
     other = graph.probe.create_publisher(JointState, STATES, 10)
     graph.probe.create_timer(0.2, lambda: other.publish(state(1.0, names=('left', 'right'))))
     graph.expect(lambda: planner.count_publishers(STATES) == 2, 'both sources')
     # Before the other one has been heard, it may be one of the same joints.
     graph.expect(lambda: graph.logged('no joint joint1, joint2 among left, right'), 'its joints')
-    before = graph.logged(f'{STATES} is published by')
-    # A second planner is a fault, of which every look at the graph tells.
+    # A second planner is a fault, of which every look at the graph tells, with all that it finds.
     graph.probe.create_publisher(JointTrajectory, COMMAND, 10)
-    text = f'{COMMAND} is published by'
-    graph.expect(
-        lambda: len([e for e in graph.log if e.name == 'flat_planner' and text in e.msg]) >= 3,
-        'three looks of the planner',
-    )
-    assert graph.logged(f'{STATES} is published by') == before
+
+    def looks():
+        text = f'{COMMAND} is published by'
+        return [e.msg for e in graph.log if e.name == 'flat_planner' and text in e.msg]
+
+    graph.expect(lambda: len(looks()) >= 3, 'three looks of the planner')
+    assert not [look for look in looks() if f'{STATES} is published by' in look]
 
 
 BROKEN = {

@@ -325,23 +325,23 @@ def test_a_motion_that_nobody_measures_makes_a_stale_report(graph):
 
 
 def test_joint_states_without_a_stamp_count_from_their_receipt(graph):
-    bench = Bench(graph, PARAMETERS | {'window': 1.0})
-    clock = bench.node.get_clock()
-    start = stamps.now(clock) + 0.1
-    bench.plan(plan_msg(start))
-    publisher = graph.probe.create_publisher(JointState, STATES, 10)
-
-    def publish():
-        msg = state_msg(stamps.now(clock), start)
+    # By a clock that stands still while a state is on its way.
+    bench = Bench(graph, PARAMETERS | {'use_sim_time': True})
+    bench.plan(plan_msg())
+    received = START + np.arange(round((DURATION + WINDOW) * RATE) + 1) / RATE
+    for count, time in enumerate(received.tolist(), 1):
+        now = stamps.time_msg(time)
+        graph.publish('/clock', Clock(clock=now))
+        graph.expect(lambda n=now: bench.node.get_clock().now().to_msg() == n, f'{time} s')
+        msg = state_msg(time)
         msg.header.stamp = stamps.time_msg(0.0)
-        publisher.publish(msg)
-
-    graph.probe.create_timer(0.01, publish)
+        graph.publish(STATES, msg)
+        graph.expect(lambda n=count: len(bench.residuals) == n, 'a residual')
     _, _, values = bench.report()
-    # What counts is received late, by a millisecond or, on a busy machine, more.
-    assert float(values['amplitude']) == pytest.approx(AMPLITUDE, rel=0.1)
-    assert float(values['frequency']) == pytest.approx(FREQUENCY, rel=0.05)
-    assert stamps.seconds(bench.residuals[0].header.stamp) == pytest.approx(start, abs=1.0)
+    assert float(values['amplitude']) == pytest.approx(AMPLITUDE, rel=1e-6)
+    assert float(values['frequency']) == pytest.approx(FREQUENCY, rel=1e-6)
+    stamped = [stamps.seconds(residual.header.stamp) for residual in bench.residuals]
+    assert stamped == pytest.approx(received, abs=1e-8)
 
 
 def test_reset_forgets_the_motion_until_the_next_plan(graph, bench):

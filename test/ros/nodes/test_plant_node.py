@@ -43,6 +43,9 @@ PUSH = '/flat_plant/push'
 QUICK = {'publish_clock': True, 'real_time_factor': 5.0, 'publish_rate': 50.0}
 """Five simulated seconds per second, so few samples that the test's own node keeps up."""
 
+BUSY = 'this machine is too slow or busy'
+"""What a plant says that makes the time when it has less of it than asked for."""
+
 LEAD = 1.5
 """From sending a command to its start, in simulated time [s]."""
 
@@ -87,12 +90,16 @@ class Plant(Rig):
         """Return a start that the plant will not have reached when it gets the command [s]."""
         return self.time() + LEAD
 
-    def drive(self, until: float):
-        """Let a plant that follows /clock go on to a time, in paces that it need not skip."""
-        while newest(self.states) < until - 0.01:
+    def drive(self, until: float, period: float = 0.01):
+        """
+        Let a plant that follows /clock go on to a time, in paces that it need not skip.
+
+        From one joint state to the next it takes less than a `period` [s].
+        """
+        while newest(self.states) < until - period:
             time = min(newest(self.states) + 0.2, until) if self.states else until
             self.graph.publish('/clock', Clock(clock=stamps.time_msg(time)))
-            self.graph.expect(lambda t=time: newest(self.states) > t - 0.01, f'{time:.3f} s')
+            self.graph.expect(lambda t=time: newest(self.states) > t - period, f'{time:.3f} s')
 
     def play(self, start: float, **fields):
         """Send a command and wait until it is over."""
@@ -147,29 +154,37 @@ def newest(states) -> float:
     return stamp(states[-1]) if states else 0.0
 
 
-def quiet(graph) -> bool:
-    """Return whether nothing was complained about."""
-    return not [entry for entry in graph.log if entry.level > Log.INFO]
+def complaints(graph) -> list[str]:
+    """Return what was complained about, the machine aside."""
+    said = [entry.msg for entry in graph.log if entry.level > Log.INFO]
+    return [text for text in said if BUSY not in text]
 
 
 def test_joint_states_come_evenly_at_200_hz(graph):
     plant = Plant(graph)
-    begin = plant.now()
-    plant.wait_until(begin + 1.0)
+    latest = graph.collect(JointState, '/joint_states', 1)
+    plant.wait_until(plant.now() + 1.0)
     first = plant.states[0]
     assert first.name == ['joint1', 'joint2']
     assert all(len(getattr(first, f)) == 2 for f in ('position', 'velocity', 'effort'))
-    assert np.diff(plant.times) == pytest.approx(5e-3, abs=1e-6)
-    present = stamps.now(plant.node.get_clock())
-    assert present - 2.0 < plant.now() < present
+    steps = np.diff(plant.times) / 5e-3
+    assert steps == pytest.approx(np.rint(steps), abs=2e-4)
+    if any(np.rint(steps) != 1.0):  # on a busy machine, which the plant tells
+        plant.logged('skipped to keep up')
+    else:
+        assert not complaints(graph)
+    clock = plant.node.get_clock()
+    graph.expect(lambda: latest and stamps.now(clock) - stamp(latest[-1]) < 2.0, 'the present')
+    assert plant.now() <= stamps.now(clock)
     assert np.array_equal(plant.table('position'), np.zeros((len(plant.states), 2)))
-    assert quiet(graph)
 
 
 @pytest.mark.parametrize('rate', [1000.0, 30.0])
 def test_the_rate_may_be_chosen(graph, rate):
-    plant = Plant(graph, {'publish_rate': rate})
-    plant.wait_until(plant.now() + 0.5)
+    plant = Plant(graph, {'publish_rate': rate, 'use_sim_time': True})
+    plant.drive(100.0, 1.0 / rate)
+    plant.drive(100.5, 1.0 / rate)
+    assert len(plant.times) >= 0.5 * rate
     assert np.diff(plant.times) == pytest.approx(1.0 / rate, abs=1e-6)
 
 
@@ -187,7 +202,7 @@ def test_a_command_is_played_by_time_and_its_effort_shown(plant, graph):
     spring = PAPER.passive_effort(positions[:, 1], velocities[:, 1])
     assert efforts[:, 1] == pytest.approx(spring, abs=1e-15)
     assert spring == pytest.approx(-3e-3 * positions[:, 1] - 2e-5 * velocities[:, 1])
-    assert quiet(graph)
+    assert not complaints(graph)
 
 
 def test_a_command_may_leave_the_passive_joint_out_and_start_on_arrival(plant):
@@ -527,7 +542,7 @@ def test_a_stream_of_efforts_moves_it_as_samples_that_are_held(graph):
     planned = expected_motion(PAPER, starts[0] + period / 2, times)
     assert np.abs(plant.table('position') - planned).max() < 2e-3
     assert np.ptp(planned[:, 0]) > 0.2
-    assert quiet(graph)
+    assert not complaints(graph)
 
 
 def test_a_stream_that_breaks_stops_safely_with_one_warning(graph):
