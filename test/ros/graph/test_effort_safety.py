@@ -14,26 +14,35 @@
 
 """Nothing moves by itself: not after a restart, not from an old, late or foreign command."""
 
+from time import monotonic
+
 from flat_planner_ros.ros.nodes.planner_node import PlannerNode
 from flat_planner_ros.ros.wire import interfaces, stamps
 import numpy as np
 import pytest
-from ros.rig import COMMAND, PLAN, Rig, stamp, START_DELAY
+from ros.conftest import TIMEOUT
+from ros.rig import COMMAND, GOAL, PLAN, Rig, stamp, START_DELAY
+from rosgraph_msgs.msg import Clock
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-DURATION = 9.0
-"""Of a motion [s]: long enough to restart a process in the middle of it."""
+DURATION = 3.0
+"""Of a motion [s]: time stands still while a process is started in the middle of it."""
+
+PACE = 0.1
+"""Time that goes on at once [s]: a command comes some of them before its start."""
+
+SIMULATED = {'use_sim_time': True, 'start_delay': START_DELAY}
 
 
 class Watched(Rig):
-    """A planner in the test and a plant in a process of its own, both watched."""
+    """A planner in the test and a plant in a process of its own, by a clock of the test."""
 
-    def __init__(self, graph, *arguments):
+    def __init__(self, graph):
         """Start both and wait for the first joint state."""
         super().__init__(graph)
-        self.arguments = arguments
+        self.time = 100.0
         self.hear_plant(matched=False)
-        self.planner = graph.create(PlannerNode, {'start_delay': START_DELAY})
+        self.planner = graph.create(PlannerNode, SIMULATED)
         self.hear_planner()
         self.start()
 
@@ -41,16 +50,41 @@ class Watched(Rig):
         """Start a plant and wait until it shows itself and hears commands."""
         # One that was killed stays in the graph for a while.
         listeners = self.graph.probe.count_subscribers(COMMAND)
-        now = stamps.now(self.graph.probe.get_clock())
-        self.plant = self.graph.start('plant_node', *self.arguments)
-        self.graph.expect(
-            lambda: self.states and stamp(self.states[-1]) > now, 'joint states of a new plant'
-        )
+        last = self.time
+        self.time += 2.0 * PACE
+        self.plant = self.graph.start('plant_node', '--ros-args', '-p', 'use_sim_time:=true')
+
+        def is_seen():
+            self.show()
+            return self.states and stamp(self.states[-1]) > last
+
+        self.graph.expect(is_seen, 'joint states of a new plant')
         # Some of the former one's may have been on their way.
-        self.states[:] = [state for state in self.states if stamp(state) > now]
+        self.states[:] = [state for state in self.states if stamp(state) > last]
         self.graph.expect(
             lambda: self.planner.count_subscribers(COMMAND) > listeners, 'a new listener'
         )
+
+    def show(self):
+        """Publish the time."""
+        self.graph.publish('/clock', Clock(clock=stamps.time_msg(self.time)))
+
+    def wait_until(self, time):
+        """Let time go on, as fast as the plant follows."""
+        while self.time < time:
+            self.time += PACE
+            self.show()
+            self.graph.expect(lambda: self.is_followed(), f'{self.time:.3f} s')
+
+    def is_followed(self):
+        """Return whether plant and planner have the present time."""
+        planner = self.time if self.planner is None else stamps.now(self.planner.get_clock())
+        return planner > self.time - 1e-6 and stamp(self.states[-1]) > self.time - 0.01
+
+    def ask(self, message, topic=GOAL):
+        """Send a goal; between two of them the arm shows itself."""
+        self.wait_until(self.time + PACE)
+        return super().ask(message, topic)
 
     def move(self, position: float, duration: float = DURATION) -> JointTrajectory:
         """Send a goal until it is accepted; return its plan."""
@@ -61,9 +95,11 @@ class Watched(Rig):
 
     def assert_next_goal_works(self) -> None:
         """Move until it is seen: a new process may not be reached for seconds by its peers."""
-        for _ in range(5):
+        until = monotonic() + TIMEOUT
+        while monotonic() < until:
             self.move(0.5, 1.0)
-            if self.graph.spin_until(lambda: self.states[-1].position[0] > 0.49, 5.0):
+            self.wait_until(self.end + 0.1)
+            if self.states[-1].position[0] > 0.49:
                 return
         pytest.fail('no motion is played')
 
@@ -91,7 +127,12 @@ def test_no_motion_takes_over_where_a_restarted_plant_stands_still(graph):
     watched.plant.kill()
     watched.start()
     new = stamp(watched.states[0])
-    graph.expect(lambda: watched.planner._session.measured.time > new, 'a state of it there')
+
+    def has_a_state_of_it():
+        watched.wait_until(watched.time + PACE)
+        return watched.planner._session.measured.time > new
+
+    graph.expect(has_a_state_of_it, 'a state of it there')
     verdict = watched.send(1.0, 1.0)
     assert watched.planner._session.measured.time < end, 'within the motion'
     assert verdict['error_name'] == 'START_STATE_MISMATCH', verdict
@@ -121,18 +162,19 @@ def test_a_command_older_than_its_own_length_is_never_played(graph, late_by):
     point = JointTrajectoryPoint(time_from_start=stamps.duration_msg(DURATION), effort=[0.0])
     first = JointTrajectoryPoint(effort=[1e-3])
     message = JointTrajectory(joint_names=['joint1'], points=[first, point])
-    now = stamps.now(watched.planner.get_clock())
-    message.header.stamp = stamps.time_msg(max(1e-9, now - late_by * DURATION))
-    graph.publish(COMMAND, message)
+    message.header.stamp = stamps.time_msg(max(1e-9, watched.time - late_by * DURATION))
+    graph.publish(COMMAND, message, readers=2)
     graph.expect(lambda: graph.logged('trajectory ignored: it ended at'), 'a refusal')
-    watched.wait_until(stamp(watched.states[-1]) + 0.2)
+    watched.wait_until(watched.time + 0.2)
     assert not watched.efforts().any()
 
 
 def test_a_planner_that_was_restarted_moves_nothing(graph):
     watched = Watched(graph)
     graph.remove(watched.planner)
-    planner = graph.start('planner_node')
+    watched.planner = None
+    words = [word for name, value in SIMULATED.items() for word in ('-p', f'{name}:={value}')]
+    planner = graph.start('planner_node', '--ros-args', *words)
     start = stamp(watched.move(1.0, 1.0))
     watched.wait_until(start + 0.5)
     planner.kill()
@@ -140,9 +182,10 @@ def test_a_planner_that_was_restarted_moves_nothing(graph):
     assert watched.states[-1].position[0] == pytest.approx(1.0, abs=1e-3)
     watched.states.clear()
     started = len(graph.logged('no model is given'))
-    graph.start('planner_node')
+    graph.start('planner_node', '--ros-args', *words)
     graph.expect(lambda: len(graph.logged('no model is given')) > started, 'a new planner')
     watched.wait_until(start + 3.0)
     assert not watched.efforts().any()
     watched.move(0.0, 1.0)
-    graph.expect(lambda: abs(watched.states[-1].position[0]) < 1e-3, 'the way back')
+    watched.wait_until(watched.end + 0.1)
+    assert abs(watched.states[-1].position[0]) < 1e-3

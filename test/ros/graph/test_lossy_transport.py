@@ -31,6 +31,9 @@ BAD = Faults(loss=0.2, duplication=0.3, reordering=0.3, delay=(0.0, 0.2))
 DELAYS = ((0.19, 0.2), (0.0, 0.02), (0.0, 0.2))
 """Of a command [s]; a motion starts 0.05 s after its verdict."""
 
+LONGER_DELAY = 2.0
+"""From a verdict to the start where a machine is too busy for the planner's own delay [s]."""
+
 REFUSED, LATE = 'trajectory ignored', 'ms after its start'
 
 
@@ -136,6 +139,9 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
     )
     kinds = []
     while len(kinds) < 8 or ('whole' not in kinds and len(kinds) < 20):
+        if len(kinds) == 8:
+            (longer,) = graph.set_parameters('flat_planner', start_delay=LONGER_DELAY)
+            assert longer.successful
         graph.call(Trigger, '/flat_plant/reset')
         lossy.wait_until(stamp(lossy.states[-1]) + 0.1)  # the planner has heard of it
         lossy.relay.faults = Faults(loss=0.2, duplication=0.5, delay=DELAYS[len(kinds) % 3])
@@ -175,10 +181,11 @@ def test_a_command_that_was_overtaken_does_not_take_over_again(graph):
         # The third command goes on from the second, which the plant has not heard of yet.
         start_tolerance=10.0,
     )
-    first = lossy.move(2.0, 2.0)
+    # Slow ones: neither is over, nor the arm far from both, when the next one is on its way.
+    first = lossy.move(2.0, 20.0)
     lossy.wait_until(float(first['start_time']) + 0.3)
     lossy.relay.faults = Faults(reordering=1.0)
-    lossy.move(1.0, 1.0)
+    lossy.move(1.0, 20.0)
     graph.expect(lambda: not lossy.relay.is_idle, 'the second command, held back')
     lossy.wait_until(stamp(lossy.states[-1]) + 0.05)
     last = lossy.move(3.0, 1.5)
@@ -200,6 +207,8 @@ def test_residuals_are_reported_honestly_from_joint_states_that_come_badly(graph
         target=STATES,
         kind=JointState,
         remap='flat_plant:joint_states:=/true_states',
+        # Few enough that a busy relay does not fall behind more and more.
+        publish_rate=50.0,
         **{'mismatch.stiffness_scale': 1.1, 'mismatch.damping_scale': 1.1},
     )
     lossy.relay.faults = BAD
