@@ -21,10 +21,17 @@ from functools import partial
 from multiprocessing import get_context
 import signal
 
+from flat_planner_ros.child_process import end_with_parent
 
-def ignore_interrupts() -> None:
-    """Leave Ctrl-C, which reaches all processes of a terminal, to the one that asks for work."""
+
+def serve_parent() -> None:
+    """
+    Leave Ctrl-C, which reaches all processes of a terminal, to the one that asks for work.
+
+    If that one ends without a word, so does this one, which would wait for work for ever.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent(signal.SIGKILL)
 
 
 def processes(workers: int) -> Callable[[], Executor]:
@@ -34,7 +41,7 @@ def processes(workers: int) -> Callable[[], Executor]:
         ProcessPoolExecutor,
         workers,
         mp_context=get_context('spawn'),
-        initializer=ignore_interrupts,
+        initializer=serve_parent,
     )
 
 

@@ -23,11 +23,12 @@ import shlex
 import signal
 import subprocess
 import sys
-from time import sleep
+from time import monotonic, sleep
 
 from flat_planner_ros.ros.programs import flat_plan
 from flat_planner_ros.ros.study import program as study
 import pytest
+from ros.conftest import TIMEOUT
 
 SPEC = """
 study:
@@ -58,11 +59,22 @@ def run(spec, output, *more):
     return output.read_text(encoding='utf-8')
 
 
+def wait_until(condition):
+    """Wait for a condition, not for ever."""
+    end = monotonic() + TIMEOUT
+    while not condition():
+        assert monotonic() < end
+        sleep(0.005)
+
+
 def wait_for_rows(output, process):
     """Wait until a process has written a chunk."""
-    while not (output.exists() and output.read_bytes().count(b'\n') > 8):
+
+    def has_rows():
         assert process.poll() is None
-        sleep(0.005)
+        return output.exists() and output.read_bytes().count(b'\n') > 8
+
+    wait_until(has_rows)
 
 
 def table_of(text):
@@ -148,7 +160,7 @@ def test_an_interrupted_study_goes_on(spec, tmp_path):
     # It has written a chunk: now it is in the midst of another one.
     wait_for_rows(output, process)
     process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
+    said = process.communicate(timeout=TIMEOUT)[1]
     assert process.returncode == 130
     done = output.read_text(encoding='utf-8')
     rows = done.count('\n') - 1
@@ -159,6 +171,28 @@ def test_an_interrupted_study_goes_on(spec, tmp_path):
     # What is there belongs to the study: its rows are those that one has alone.
     mark = json.loads((tmp_path / 'many.csv.study').read_text(encoding='utf-8'))
     assert mark['rows'] == 16_000
+
+
+def test_a_study_that_is_killed_leaves_no_process_behind(spec, tmp_path):
+    spec.write_text(SPEC.replace('repeats: 12', 'repeats: 4000'), encoding='utf-8')
+    output = tmp_path / 'many.csv'
+    words = [str(spec), '-o', str(output), '--workers', '1', '--no-times']
+    process = subprocess.Popen([sys.executable, '-c', CODE, *words])
+    wait_for_rows(output, process)
+    threads = Path(f'/proc/{process.pid}/task').glob('*/children')
+    workers = [Path('/proc', child) for thread in threads for child in thread.read_text().split()]
+    assert workers
+    process.kill()
+    process.wait(TIMEOUT)
+    wait_until(lambda: not any(map(is_alive, workers)))
+
+
+def is_alive(place):
+    """Return whether a process, by its place in /proc, has not ended; nobody may bury it."""
+    try:
+        return (place / 'stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 def test_standard_output_gets_the_table(spec, whole, capsys):
