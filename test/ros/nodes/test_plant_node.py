@@ -43,6 +43,9 @@ PUSH = '/flat_plant/push'
 QUICK = {'publish_clock': True, 'real_time_factor': 5.0, 'publish_rate': 50.0}
 """Five simulated seconds per second, so few samples that the test's own node keeps up."""
 
+QUEUE = 20_000
+"""Joint states that may wait for a test on a busy machine."""
+
 BUSY = 'this machine is too slow or busy'
 """What a plant says that makes the time when it has less of it than asked for."""
 
@@ -64,7 +67,7 @@ class Plant(Rig):
     def __init__(self, graph, parameters=None, *arguments):
         """Listen first, so that nothing is missed, then start it."""
         super().__init__(graph)
-        self.hear_plant(matched=False)
+        self.hear_plant(qos=QUEUE, matched=False)
         self.node = graph.create(PlantNode, parameters, *arguments)
         if not self.node.get_parameter('use_sim_time').value:
             graph.expect(lambda: self.states, 'a joint state')

@@ -132,10 +132,11 @@ def record_motion(graph, path: Path, speed: float = 3.0) -> list[DiagnosticArray
     simulated = {'use_sim_time': True}
     graph.create(PlannerNode, {'start_delay': 0.5, **simulated})
     graph.create(MonitorNode, {'window': WINDOW, **simulated})
-    plant = {'mismatch.stiffness_scale': 1.1, 'noise.position_std': 1e-4}
+    # So rarely that one process hears all of them several times on a busy machine.
+    plant = {'mismatch.stiffness_scale': 1.1, 'noise.position_std': 1e-4, 'publish_rate': 50.0}
     graph.create(PlantNode, {'publish_clock': True, 'real_time_factor': speed, **plant})
     reports = graph.collect(DiagnosticArray, '/flat_monitor/report', interfaces.LATCHED)
-    states = graph.collect(JointState, '/joint_states', interfaces.RELIABLE)
+    states = graph.collect(JointState, '/joint_states')
     graph.expect(lambda: states, 'joint states')
     recorder = record(graph, path)
     for topic in ('/joint_states', '/flat_planner/joint_trajectory'):
@@ -149,18 +150,14 @@ def record_motion(graph, path: Path, speed: float = 3.0) -> list[DiagnosticArray
     graph.publish('/flat_planner/goal', goal(1.0, 0.5))
     graph.expect(lambda: reports, 'a report')
     judged = float(values(reports[0])['end_time']) + WINDOW
-    graph.expect(lambda: stamp(states[-1]) >= judged, 'the samples that the report rests on')
-    seen = 0
-
-    def has_all():
-        nonlocal seen
-        seen, before = path.stat().st_size, seen
-        if seen == before:  # a look into it takes as long as many messages
-            return False
-        return set(Recording(path).topics) >= OURS and last_state(path) >= judged
-
-    graph.expect(has_all, 'all that the report rests on in the file')
+    # The recorder takes its messages in turns with the test; a look into the file on the way would
+    # take as long as hundreds of them.
+    graph.expect(
+        lambda: stamp(states[-1]) >= judged + 0.1, 'the samples that the report rests on, and more'
+    )
     graph.remove(recorder)
+    assert set(Recording(path).topics) >= OURS
+    assert last_state(path) >= judged
     return reports
 
 
