@@ -61,7 +61,7 @@ def test_plans_of_several_threads_are_the_same_as_of_one():
     barrier = Barrier(THREADS)
 
     def together(arm, options, duration):
-        barrier.wait(timeout=30.0)
+        barrier.wait(timeout=60.0)
         return results(arm, options, duration)
 
     strategies = [s for s in Strategy if s not in (Strategy.CUSTOM, Strategy.INSENSITIVE)]

@@ -21,7 +21,8 @@ import shutil
 import signal
 
 import pytest
-from ros.live_view.viewer import start_demo, TIMEOUT, View
+from ros.conftest import TIMEOUT
+from ros.live_view.viewer import start_demo, View
 
 CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser'))), None)
 

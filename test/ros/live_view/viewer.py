@@ -26,11 +26,9 @@ import pytest
 aiohttp = pytest.importorskip('aiohttp')
 
 from flat_planner_ros.ros import live_view as live  # noqa: E402, I100  They need it.
+from ros.conftest import TIMEOUT  # noqa: E402
 
 PAGE = Path(live.__file__).parent / 'page'
-
-TIMEOUT = 20.0
-"""Time in which anything must happen that happens at all [s]."""
 
 
 class Browser:
