@@ -31,6 +31,9 @@ DURATION = 3.0
 PACE = 0.1
 """Time that goes on at once [s]: a command comes some of them before its start."""
 
+AGAIN = 0.05
+"""Real time after which the clock is shown again, should it have been missed [s]."""
+
 SIMULATED = {'use_sim_time': True, 'start_delay': START_DELAY}
 
 
@@ -53,28 +56,31 @@ class Watched(Rig):
         last = self.time
         self.time += 2.0 * PACE
         self.plant = self.graph.start('plant_node', '--ros-args', '-p', 'use_sim_time:=true')
-
-        def is_seen():
-            self.show()
-            return self.states and stamp(self.states[-1]) > last
-
-        self.graph.expect(is_seen, 'joint states of a new plant')
+        self.graph.expect(lambda: 'ready' in self.plant.stderr, 'a new plant')
+        # Its first joint states may be sent to nobody: a sample later each time.
+        self.show(
+            lambda: self.states and stamp(self.states[-1]) > last, 'joint states of it', 0.005
+        )
         # Some of the former one's may have been on their way.
         self.states[:] = [state for state in self.states if stamp(state) > last]
         self.graph.expect(
             lambda: self.planner.count_subscribers(COMMAND) > listeners, 'a new listener'
         )
 
-    def show(self):
-        """Publish the time."""
+    def show(self, condition, what, step=0.0):
+        """Publish the time, later by a step [s] each time, until a condition holds."""
+        until = monotonic() + TIMEOUT
         self.graph.publish('/clock', Clock(clock=stamps.time_msg(self.time)))
+        while not self.graph.spin_until(condition, AGAIN):
+            assert monotonic() < until, what
+            self.time += step
+            self.graph.publish('/clock', Clock(clock=stamps.time_msg(self.time)))
 
     def wait_until(self, time):
         """Let time go on, as fast as the plant follows."""
         while self.time < time:
             self.time += PACE
-            self.show()
-            self.graph.expect(lambda: self.is_followed(), f'{self.time:.3f} s')
+            self.show(self.is_followed, f'{self.time:.3f} s')
 
     def is_followed(self):
         """Return whether plant and planner have the present time."""

@@ -34,6 +34,13 @@ DELAYS = ((0.19, 0.2), (0.0, 0.02), (0.0, 0.2))
 LONGER_DELAY = 2.0
 """From a verdict to the start where a machine is too busy for the planner's own delay [s]."""
 
+EXACT, STEP_LATE = 1e-5, 2e-5
+"""
+What a whole motion leaves at most, and one whose command came within the plant's first step [rad].
+
+A step is 1 ms, which leaves 1.85e-5 rad; the plant takes it for in time.
+"""
+
 REFUSED, LATE = 'trajectory ignored', 'ms after its start'
 
 
@@ -164,10 +171,12 @@ def test_a_command_is_played_by_its_stamp_to_the_end_or_not_at_all(graph):
         assert not efforts[times > end].any()
         _, angles, _ = lossy.between(end, end + 1.0)
         assert_honest(lossy.reports[-1], angles)
-        if kinds[-1] == 'whole':
-            assert np.abs(angles).max() < 1e-5
+        if kinds[-1] == 'whole' and np.abs(angles).max() > EXACT:
+            assert np.abs(angles).max() < STEP_LATE
+            kinds[-1] = 'a step late'
     assert 'not played' in kinds, kinds
     if 'whole' not in kinds:
+        assert 'a step late' not in kinds
         not_verified(f'none of {len(kinds)} motions was played from its start')
 
 
