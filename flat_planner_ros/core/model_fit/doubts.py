@@ -16,6 +16,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from math import sqrt
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.judgement import correlation_lengths, covariance
 from flat_planner_ros.core.model_fit.last_links import NAMES
 from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, Refined
-from flat_planner_ros.core.model_fit.simulation import CHANNELS, Observed
+from flat_planner_ros.core.model_fit.simulation import CHANNELS, Observed, SingleOrDouble
 import numpy as np
 
 MIDDLE, SPREAD = 0.5, 12.0**-0.5
@@ -49,14 +50,21 @@ class Change(NamedTuple):
 
     """
 
-    residuals: FloatArray
+    residuals: SingleOrDouble
     gradient: FloatArray
     normal: FloatArray
 
+    @property
+    def power(self) -> FloatArray:
+        """Return the sum of squares of the residuals' change, shape (2,) [-]."""
+        power: FloatArray = (self.residuals**2).sum(axis=0, dtype=float)
+        return power
+
     def besides(self, other: 'Change') -> 'Change':
         """Return the change without what is like another one (least squares)."""
-        power = float((other.residuals**2).sum())
-        share = float((self.residuals * other.residuals).sum()) / power if power > 0.0 else 0.0
+        power = float(other.power.sum())
+        both = float((self.residuals * other.residuals).sum(dtype=float))
+        share = both / power if power > 0.0 else 0.0
         return Change(
             self.residuals - share * other.residuals,
             self.gradient - share * other.gradient,
@@ -65,8 +73,8 @@ class Change(NamedTuple):
 
     def growth_from(self, finer: 'Change') -> float:
         """Return how much larger it is than one of half the spacing, within what can be [-]."""
-        power = float((finer.residuals**2).sum())
-        growth = sqrt(float((self.residuals**2).sum()) / power) if power > 0.0 else 0.0
+        power = float(finer.power.sum())
+        growth = sqrt(float(self.power.sum()) / power) if power > 0.0 else 0.0
         return min(max(growth, SECOND_ORDER), THIRD_ORDER)
 
     def step(self, scales: FloatArray) -> FloatArray:
@@ -80,7 +88,7 @@ class Change(NamedTuple):
     def left(self, step: FloatArray) -> FloatArray:
         """Return the mean square change of the residuals that a step leaves, shape (2,) [-]."""
         by_step = 2.0 * self.gradient @ step + step @ self.normal @ step
-        left: FloatArray = np.maximum((self.residuals**2).sum(axis=0) + by_step, 0.0)
+        left: FloatArray = np.maximum(self.power + by_step, 0.0)
         return left / len(self.residuals)
 
 
@@ -107,7 +115,7 @@ class Doubt(NamedTuple):
 def change_between(here: Linearisation, there: Linearisation, spread: FloatArray) -> Change:
     """Return what another way to see the recording changes; `spread` is that of both."""
     pairs = zip(there.residuals, here.residuals, strict=True)
-    residuals = np.concatenate([(new - old) / spread for new, old in pairs])
+    residuals = np.concatenate([((new - old) / spread).astype(np.float32) for new, old in pairs])
     return Change(residuals, there.gradient - here.gradient, there.normal)
 
 
@@ -142,7 +150,8 @@ def straightness(
     step = change.step(scales[free])
     alike = max(correlation_lengths(found.around))
     told = float(change.left(step).sum()) * len(change.residuals) / alike
-    along = np.concatenate(found.around.residuals) / found.spread * change.residuals
+    left = np.concatenate(found.around.residuals)
+    along = (left * change.residuals).sum(axis=0, dtype=float) / found.spread
     slope = float(along.sum() + found.around.gradient.sum(axis=0) @ step) / alike
     whole = told + SPREAD**-2
     pull = slope + (observed.straightness - MIDDLE) / SPREAD**2
@@ -160,10 +169,16 @@ def errors_of(
     own = scales[free]
     inside = covariance(found.around, own) * np.outer(own, own)
     left = np.zeros(CHANNELS)
-    for weight, change, cover in doubts:
-        step = change.step(own)
-        inside += weight**2 * np.outer(step, step)
-        left += (cover * weight * found.spread) ** 2 * change.left(step)
+    # By `map` no change outlives its numbers: a recording may be long.
+    for step, remains in map(partial(_answered, scales=own), doubts):
+        inside += np.outer(step, step)
+        left += found.spread**2 * remains
     whole = np.zeros((len(NAMES), len(NAMES)))
     whole[np.ix_(free, free)] = inside
     return whole, np.sqrt(left)
+
+
+def _answered(doubt: Doubt, scales: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a doubt's error of the parameters, and the mean square that it leaves (2,) [-]."""
+    step = doubt.change.step(scales)
+    return doubt.weight * step, (doubt.cover * doubt.weight) ** 2 * doubt.change.left(step)

@@ -221,7 +221,7 @@ def _signals(
         windows = Windows(grid, length, POWER)
         absolute = np.cumsum(measurements.positions[first:last], axis=1)[:, :-1]
         angles = np.column_stack([np.interp(grid, times, column) for column in absolute.T])
-        rates = derivatives(grid, angles, span)[1]
+        (rates,) = derivatives(grid, angles, span, orders=(1,))
         joints = np.diff(rates, axis=1, prepend=0.0)
         known, efforts = times[::every], measurements.efforts[first:last:every].T
         signals = ChainSignals(

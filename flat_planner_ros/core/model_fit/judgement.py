@@ -70,7 +70,8 @@ def correlation_lengths(around: Linearisation) -> list[float]:
     """Return the correlation length of either channel's residuals [-]."""
     parts = around.residuals
     return [
-        correlation_length([part[:, channel] for part in parts]) for channel in range(CHANNELS)
+        correlation_length([part[:, channel].astype(float) for part in parts])
+        for channel in range(CHANNELS)
     ]
 
 

@@ -117,7 +117,7 @@ def fit_last_links(
 ) -> LastFit:
     """Fit the last two links; parameters and errors as for `fit_model`."""
     period = 2 * pi / start.natural_mode().frequency
-    observed = observed_of(measurements, period)
+    observed = observed_of(measurements, period, with_turning=with_imbalance)
     check_moves(measurements)
     believed = vector_of(start)
     noise = np.maximum(noise_of_links(measurements), 1e-9)

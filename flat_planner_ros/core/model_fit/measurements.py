@@ -98,16 +98,17 @@ def noise_of(measurements: Measurements) -> FloatArray:
     """Return the spread of noise and rounding in each smooth joint angle, shape (n,) [rad]."""
     times, positions = measurements.times, measurements.positions
     gain = sqrt(comb(2 * DIFFERENCE_ORDER, DIFFERENCE_ORDER))
-    differences = np.concatenate(
-        [
-            np.diff(positions[first:last], DIFFERENCE_ORDER, axis=0)
-            for first, last in stretches(times, measurements.period)
-        ]
-    )
-    if not differences.size:
+    power, count = np.zeros(measurements.joints), 0
+    for first, last in stretches(times, measurements.period):
+        # One by one: a recording may be long.
+        for joint, column in enumerate(positions[first:last].T):
+            differences = np.diff(column, DIFFERENCE_ORDER)
+            power[joint] += differences @ differences
+        count += max(last - first - DIFFERENCE_ORDER, 0)
+    if not count:
         raise InvalidRequest('the measurements have no stretch without gaps')
     rounding = np.array([encoder_step(column) for column in positions.T]) / sqrt(12.0)
-    white = np.sqrt(np.mean(differences**2, axis=0)) / gain
+    white = np.sqrt(power / count) / gain
     found: FloatArray = np.maximum(white, rounding)
     return found
 

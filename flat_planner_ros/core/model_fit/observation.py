@@ -36,6 +36,7 @@ from flat_planner_ros.core.model_fit.signals import (
 )
 from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
+import numpy.typing as npt
 
 SEGMENT = 6.0
 """Longest segment, in free periods of the passive joint [-]."""
@@ -60,8 +61,10 @@ LONGER = 1.6
 """Factor on the span of smoothed velocities, what comes of which shows what they cost [-]."""
 
 
-def observed_of(measurements: Measurements, period: float) -> Observed:
-    """Return the last two links in absolute angles."""
+def observed_of(
+    measurements: Measurements, period: float, *, with_turning: bool = False
+) -> Observed:
+    """Return the last two links, with what a coupling of both turns on demand."""
     if not np.ptp(measurements.positions, axis=0).any():
         raise InvalidRequest('no joint moves in the measurements: only motions tell a model')
     if not np.ptp(measurements.positions[:, -1]):
@@ -69,27 +72,26 @@ def observed_of(measurements: Measurements, period: float) -> Observed:
             f'joint {measurements.joints} stands still in all {measurements.times.size} '
             'measurements: only its swings tell a model'
         )
-    times, angles = measurements.times, np.cumsum(measurements.positions, axis=1)
+    times, shown = measurements.times, _shown(measurements)
     span = max(SMOOTHING * period, FEWEST * measurements.period)
-    _, rates, accelerations = derivatives(times, angles, span)
+    (rates,) = derivatives(times, shown, span, orders=(1,))
     base = base_rate(measurements, base_smoothing(measurements, period))
     cuts = sudden_changes(measurements.efforts[:, -1]) if measurements.are_held else []
     segments = segments_of(times, measurements.period, SEGMENT * period, cuts)
     if not segments:
         raise InvalidRequest('the measurements have no stretch without gaps')
-    shown = np.column_stack((angles[:, -2], measurements.positions[:, -1]))
     each = np.array([encoder_step(column) for column in measurements.positions.T])
     steps = np.array([np.linalg.norm(each[:-1]), each[-1]])
     return Observed(
         times=times,
         angles=shown,
-        rates=np.column_stack((rates[:, -2], rates[:, -1] - rates[:, -2])),
+        rates=rates.astype(np.float32),
         effort=measurements.efforts[:, -1],
         base=base,
         moves=np.column_stack([moves_of(*pair) for pair in zip(shown.T, steps, strict=True)]),
         rounding=steps / sqrt(12.0),
         segments=segments,
-        turning=turning_of(measurements.positions[:, -1], rates[:, -2:], accelerations[:, -2:]),
+        turning=_turning(times, shown, rates, span) if with_turning else None,
     )
 
 
@@ -110,12 +112,29 @@ def check_moves(measurements: Measurements) -> None:
         )
 
 
+def _shown(measurements: Measurements) -> FloatArray:
+    """Return the angle of link n-1 and of the passive joint, shape (m, 2) [rad]."""
+    if measurements.joints == 2:
+        return measurements.positions
+    link = measurements.positions[:, :-1].sum(axis=1)
+    return np.column_stack((link, measurements.positions[:, -1]))
+
+
+def _turning(
+    times: FloatArray, shown: FloatArray, rates: FloatArray, span: float
+) -> npt.NDArray[np.float32]:
+    """Return `Observed.turning`, of angles and velocities as they are shown (m, 2)."""
+    (accelerations,) = derivatives(times, shown, span, orders=(2,))
+    both = (np.cumsum(each, axis=1) for each in (rates, accelerations))
+    return turning_of(shown[:, 1], *both).astype(np.float32)
+
+
 def base_rate(measurements: Measurements, smoothing: Smoothing) -> FloatArray:
     """Return the smoothed velocity of link n-2, shape (m,): none with two joints, or at rest."""
     angle = measurements.positions[:, :-2].sum(axis=1, keepdims=True)
     if float(angle.std()) <= STILL * smoothing.noise:
-        return np.zeros(measurements.times.size)
-    return derivatives(measurements.times, angle, smoothing.span)[1][:, 0]
+        return np.broadcast_to(0.0, measurements.times.size)
+    return derivatives(measurements.times, angle, smoothing.span, orders=(1,))[0][:, 0]
 
 
 def base_smoothing(measurements: Measurements, period: float) -> Smoothing:

@@ -88,7 +88,8 @@ class Linearisation(NamedTuple):
     rounding
         The same for the rounding of encoders, which err alike as long as they stand still.
     residuals
-        What is left of either channel in each segment, not weighted, (samples, 2) [rad].
+        What is left of either channel in each segment, not weighted, (samples, 2) [rad]. Single
+        precision does: rounding is 1e-7 of what is itself an error.
     corrections
         For each segment the step of its own unknowns without a step of the parameters (own,), and
         the change of that with them (own, free).
@@ -100,7 +101,7 @@ class Linearisation(NamedTuple):
     normal: FloatArray
     scatter: FloatArray
     rounding: FloatArray
-    residuals: list[FloatArray]
+    residuals: list[npt.NDArray[np.float32]]
     corrections: list[tuple[FloatArray, FloatArray]]
 
 
@@ -166,7 +167,7 @@ def linearised(
             rounding += share**2 * _alike(own, moves)
         scores = (left[:, None] * left_columns).reshape(len(piece[0]), CHANNELS, count).sum(axis=1)
         scatter += neighbours(scores, max(1, round(NEIGHBOURS * len(scores))))
-        residuals.append(left.reshape(-1, CHANNELS) * spread)
+        residuals.append((left.reshape(-1, CHANNELS) * spread).astype(np.float32))
         corrections.append(correction)
     return Linearisation(cost, gradient, normal, scatter, rounding, residuals, corrections)
 
@@ -253,7 +254,7 @@ def refine(
             damping = max(10 * damping, 1e-4)
     samples = sum(map(len, best.residuals))
     unknowns = STATES * len(best.residuals) + len(free)
-    power = sum((left**2).sum(axis=0) for left in best.residuals)
+    power = sum((left**2).sum(axis=0, dtype=float) for left in best.residuals)
     found = np.sqrt(power / max(samples - unknowns / CHANNELS, 1.0))
     return Refined(point[0], point[1], found, best)
 
@@ -306,8 +307,15 @@ def _segments(
     models = np.tile(parameters, (1 + len(free), 1))
     models[1 + np.arange(len(free)), list(free)] += nudges
     for block in blocks(observed):
-        seen = seen_with_slopes(observed, block, models, starts[block])
-        for segment, (angles, by_own) in zip(observed.segments[block], seen, strict=True):
-            by_parameter = (angles[..., 1:] - angles[..., :1]) / nudges
-            measured = observed.angles[segment.first : segment.last]
-            yield angles[..., 0] - measured, by_own, by_parameter
+        yield from _of_block(observed, block, models, starts[block], nudges)
+
+
+def _of_block(
+    observed: Observed, block: slice, models: FloatArray, starts: FloatArray, nudges: FloatArray
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Yield the same for the segments of a block, of which nothing stays behind."""
+    seen = seen_with_slopes(observed, block, models, starts)
+    for segment, (angles, by_own) in zip(observed.segments[block], seen, strict=True):
+        by_parameter = (angles[..., 1:] - angles[..., :1]) / nudges
+        measured = observed.angles[segment.first : segment.last]
+        yield angles[..., 0] - measured, by_own, by_parameter

@@ -169,10 +169,14 @@ def span_for(noise: float, period: float, longest: float) -> float:
 
 
 def derivatives(
-    times: FloatArray, angles: FloatArray, width: float, degree: int = 4
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+    times: FloatArray,
+    angles: FloatArray,
+    width: float,
+    degree: int = 4,
+    orders: Sequence[int] = (0, 1, 2),
+) -> tuple[FloatArray, ...]:
     """
-    Return smoothed angles and their first two derivatives, each as (m, n).
+    Return smoothed angles and their first two derivatives, or those asked for, each as (m, n).
 
     A polynomial is fitted around every sample (Savitzky and Golay 1964), on an even grid of the
     usual period to which uneven samples are brought first.
@@ -185,6 +189,8 @@ def derivatives(
         Time that the polynomials span [s].
     degree
         Of the polynomials.
+    orders
+        Of the derivatives.
 
     """
     period = float(np.median(np.diff(times)))
@@ -192,29 +198,30 @@ def derivatives(
     grid = np.linspace(times[0], times[-1], count)
     window = min(max(2 * round(width / period / 2) + 1, degree + 3 - degree % 2), count)
     window -= 1 - window % 2
-    even = np.column_stack([np.interp(grid, times, column) for column in angles.T])
     spacing = float(grid[1] - grid[0])
-    found = [
-        np.column_stack([np.interp(times, grid, column) for column in smooth.T])
-        for smooth in _smoothed(even, window, degree, spacing)
-    ]
-    return found[0], found[1], found[2]
+    found = tuple(np.empty_like(angles) for _ in orders)
+    # One by one: a recording may be long.
+    for place, column in enumerate(angles.T):
+        even = np.interp(grid, times, column)
+        for result, order in zip(found, orders, strict=True):
+            smooth = _smoothed(even, window, degree, spacing, order)
+            result[:, place] = np.interp(times, grid, smooth)
+    return found
 
 
-def _smoothed(even: FloatArray, window: int, degree: int, spacing: float) -> list[FloatArray]:
-    """Return even samples (m, n) and two derivatives by polynomials over a window of samples."""
+def _smoothed(
+    even: FloatArray, window: int, degree: int, spacing: float, order: int
+) -> FloatArray:
+    """Return a derivative of even samples (m,) by polynomials over a window of samples."""
     # Not scipy's: its signal processing alone takes 40 MB and a second to load.
     half = window // 2
     places = np.arange(-half, half + 1) * spacing
     scale = half * spacing
     fit = np.linalg.pinv(np.vander(places / scale, degree + 1, increasing=True))
-    found = []
-    for order in range(3):
-        rows = np.polynomial.polynomial.polyder(fit, order) / scale**order
-        inside = [np.correlate(column, rows[0], mode='valid') for column in even.T]
-        powers = np.vander(places / scale, degree + 1 - order, increasing=True)
-        # At both ends the polynomial of the last whole window goes on.
-        before = powers[:half] @ rows @ even[:window]
-        after = powers[half + 1 :] @ rows @ even[-window:]
-        found.append(np.concatenate((before, np.column_stack(inside), after)))
-    return found
+    rows = np.polynomial.polynomial.polyder(fit, order) / scale**order
+    inside = np.correlate(even, rows[0], mode='valid')
+    powers = np.vander(places / scale, degree + 1 - order, increasing=True)
+    # At both ends the polynomial of the last whole window goes on.
+    before = powers[:half] @ rows @ even[:window]
+    after = powers[half + 1 :] @ rows @ even[-window:]
+    return np.concatenate((before, inside, after))

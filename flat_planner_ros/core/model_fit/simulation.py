@@ -21,7 +21,7 @@ grows with neither.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.base_errors import BaseErrors
@@ -44,14 +44,18 @@ import numpy.typing as npt
 BLOCK = 20
 """Segments that are simulated side by side: a minute of motion."""
 
-CHUNK = 256
+CHUNK = 128
 """Steps whose states are held at a time: memory does not grow with the recording."""
 
-SHORTEST_CHUNK, MOST_SLOPES = 32, 200_000
+SHORTEST_CHUNK, MOST_SLOPES = 32, 80_000
 """Steps that are worth their overhead, and derivatives of states that are held at a time [-]."""
 
 CHANNELS = 2
 """Angle of link n-1 and of the passive joint."""
+
+
+SingleOrDouble: TypeAlias = npt.NDArray[np.float32] | FloatArray
+"""Array of floats in single precision, for half the memory, or in double."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,7 +70,8 @@ class Observed:
     angles
         Of link n-1 and of the passive joint, shape (m, 2) [rad].
     rates
-        Their smoothed velocities, shape (m, 2) [rad/s], for the first guess of the starts.
+        Their smoothed velocities, shape (m, 2) [rad/s], for the first guess of the starts: single
+        precision does.
     effort
         Of joint n-1, shape (m,) [N m].
     base
@@ -83,7 +88,8 @@ class Observed:
         By which the steps of the integration are divided [-].
     turning
         What a coupling of both links takes from either for each unit, as measured, shape (m, 2)
-        [rad/s^2]; None where none is looked for.
+        [rad/s^2]; None where none is looked for. Single precision does: it is off by 1e-7 of a
+        coupling that is small itself.
     base_errors
         What `base` may be off where friction turns; None for nothing.
 
@@ -91,7 +97,7 @@ class Observed:
 
     times: FloatArray
     angles: FloatArray
-    rates: FloatArray
+    rates: SingleOrDouble
     effort: FloatArray
     base: FloatArray
     moves: npt.NDArray[np.bool_]
@@ -99,7 +105,7 @@ class Observed:
     segments: Sequence[Segment]
     straightness: float = 0.0
     refinement: float = 1.0
-    turning: FloatArray | None = None
+    turning: SingleOrDouble | None = None
     base_errors: BaseErrors | None = None
 
     @property
@@ -111,7 +117,7 @@ class Observed:
 def first_starts(observed: Observed) -> FloatArray:
     """Return measured states at the starts of the segments, no error, (segments, unknowns)."""
     first = [segment.first for segment in observed.segments]
-    measured = np.hstack((observed.angles[first], observed.rates[first]))
+    measured = np.hstack((observed.angles[first], observed.rates[first].astype(float)))
     return with_unknowns(observed, measured)
 
 
@@ -185,20 +191,34 @@ def seen_with_slopes(
     begun = np.broadcast_to(np.eye(STATES, own), (len(unknowns), STATES, own))
     length = min(CHUNK, max(SHORTEST_CHUNK, MOST_SLOPES // (own * len(unknowns))))
     for chunk in _chunks(observed, samples, models, length):
-        forcing, by_base = chunk.forcing, None
-        if errors is not None and own > STATES:
-            off = errors.at(chunk.grid, unknowns.T[None, STATES:])
-            forcing = forcing._replace(base=forcing.base + off)
-            by_base = errors.slopes(chunk.grid)
-        motion = motions(models, starts, forcing)
-        by_step = step_slopes(models[:1], motion[:, 0], forcing.step)
-        by_unknown = carried_on(by_step, begun, by_base)
-        starts, begun = motion[-1, :, :STATES], by_unknown[-1]
-        samples.read(seen, chunk, motion[:, :, :STATES].transpose(3, 0, 2, 1))
+        motion, by_unknown = _carried_on(chunk, errors, models, unknowns, starts, begun)
+        # Copies: what led to them need not stay.
+        starts, begun = motion[-1].copy(), by_unknown[-1].copy()
+        samples.read(seen, chunk, motion.transpose(3, 0, 2, 1))
         samples.read(slopes, chunk, by_unknown.swapaxes(0, 1))
+        del motion, by_unknown
     for angles in seen:
         angles[:, 1] += models[:, OFFSET]
     return list(zip(seen, slopes, strict=True))
+
+
+def _carried_on(
+    chunk: '_Chunk',
+    errors: BaseErrors | None,
+    models: FloatArray,
+    unknowns: FloatArray,
+    starts: FloatArray,
+    begun: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the states of a chunk and their derivatives by the unknowns, from its first ones."""
+    forcing, by_base = chunk.forcing, None
+    if errors is not None and unknowns.shape[1] > STATES:
+        off = errors.at(chunk.grid, unknowns.T[None, STATES:])
+        forcing = forcing._replace(base=forcing.base + off)
+        by_base = errors.slopes(chunk.grid)
+    motion = motions(models, starts, forcing)
+    by_step = step_slopes(models[:1], motion[:, 0], forcing.step)
+    return motion[:, :, :STATES], carried_on(by_step, begun, by_base)
 
 
 class _Chunk(NamedTuple):

@@ -107,7 +107,8 @@ class Windows:
     def __call__(self, signal: FloatArray, order: int = 0) -> FloatArray:
         """Return the means of a signal's derivative of some order, 0 to 2; shape (windows,)."""
         weights = (-1) ** order * self._windows[order]
-        return np.correlate(signal, weights, mode='valid')[:: self._stride]
+        # A copy: what is between need not stay.
+        return np.correlate(signal, weights, mode='valid')[:: self._stride].copy()
 
     def gain(self, order: int) -> float:
         """Return the spread of such a mean for white noise of a standard deviation of one."""

@@ -16,6 +16,8 @@
 
 import tracemalloc
 
+from flat_planner_ros.core.model_fit import Measurements
+from flat_planner_ros.core.model_fit.observation import observed_of
 from flat_planner_ros.core.model_fit.refinement import linearised
 from flat_planner_ros.core.model_fit.signals import Segment
 from flat_planner_ros.core.model_fit.simulation import Observed
@@ -58,3 +60,19 @@ def test_memory_grows_neither_with_segments_nor_with_their_length():
     few = peak_memory(20, 0.06)
     assert peak_memory(40, 0.06) < 1.1 * few
     assert peak_memory(20, 0.2) < 1.1 * few
+
+
+def test_what_is_kept_of_a_recording_is_less_than_half_of_it():
+    times = np.arange(40_000) * 0.005
+    positions = 1e-4 * np.random.default_rng(1).standard_normal((times.size, 2))
+    seen = Measurements(times=times, positions=positions, efforts=positions[:, :1])
+    observed_of(seen, 0.5)  # what is imported on the way counts for nothing
+    tracemalloc.start()
+    try:
+        kept = observed_of(seen, 0.5)
+        held = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    own = sum(each.nbytes for each in (seen.times, seen.positions, seen.efforts))
+    assert kept.times.size == times.size
+    assert held < 0.5 * own
