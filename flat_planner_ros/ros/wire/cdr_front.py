@@ -16,7 +16,7 @@
 
 from struct import Struct, unpack_from
 
-from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
+from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS
 
 ORDERS = {b'\0\0': '>', b'\0\1': '<'}
 """Byte order by the representation that a message states: plain CDR, big or little endian."""
@@ -64,6 +64,13 @@ class Front:
         begin = self.taken(2 * LENGTH)
         sec, nanosec = unpack_from(self._stamp, self._data, begin)
         return float(sec + nanosec / NANOSECONDS)
+
+    def trajectory(self) -> tuple[float, tuple[str, ...], int]:
+        """Return the stamp of a JointTrajectory [s], its joints and how many points follow."""
+        stamp = self.stamp()
+        self.string()
+        names = tuple([self.string() for _ in range(self.length(LENGTH))])
+        return stamp, names, self.length(ARRAYS * LENGTH)
 
     def length(self, size: int) -> int:
         """Return the length of a sequence whose entries take at least some bytes each."""

@@ -21,7 +21,7 @@ Whatever is not exactly of the usual form is left to the middleware.
 from struct import unpack_from
 
 from flat_planner_ros.core.session import Goal, GoalPoint, MAX_POINTS
-from flat_planner_ros.ros.wire.cdr_front import Front, LENGTH, ORDERS, Unusual
+from flat_planner_ros.ros.wire.cdr_front import Front, ORDERS, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS
 
 
@@ -41,10 +41,7 @@ def read_goal(data: bytes) -> Goal | None:
         return None
     front = Front(data, order)
     try:
-        stamp = front.stamp()
-        front.string()
-        names = tuple([front.string() for _ in range(front.length(LENGTH))])
-        count = front.length(ARRAYS * LENGTH)
+        stamp, names, count = front.trajectory()
         if count > MAX_POINTS:
             return None
         points = tuple([_point(front, data, order) for _ in range(count)])

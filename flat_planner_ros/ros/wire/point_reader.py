@@ -23,7 +23,7 @@ form is left to the middleware.
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
-from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, LENGTH, ORDERS, Unusual
+from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, ORDERS, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
 import numpy as np
 
@@ -95,10 +95,7 @@ def read_points(data: bytes) -> PointTable | None:
         return None
     front = Front(data, order)
     try:
-        stamp = front.stamp()
-        front.string()
-        names = tuple([front.string() for _ in range(front.length(LENGTH))])
-        count = front.length(ARRAYS * LENGTH)
+        stamp, names, count = front.trajectory()
         if not count:
             return None
         start = front.at
