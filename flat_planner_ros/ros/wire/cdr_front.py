@@ -18,14 +18,23 @@ from struct import Struct, unpack_from
 
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS
 
-ORDERS = {b'\0\0': '>', b'\0\1': '<'}
-"""Byte order by the representation that a message states: plain CDR, big or little endian."""
-
 HEADER = 4
 """Bytes of the encapsulation; offsets count from its end."""
 
+# By the representation that a message states, and no options.
+_ORDERS = {b'\0\0\0\0': '>', b'\0\1\0\0': '<'}
+
 LENGTH, DOUBLE = 4, 8
 """Bytes of a sequence's length and of a number; each is aligned to its own size."""
+
+
+def order_of(data: bytes) -> str | None:
+    """
+    Return the byte order of a message in plain CDR; None if it is of another form.
+
+    One that states options is: some implementations count bytes there that do not belong to it.
+    """
+    return _ORDERS.get(data[:HEADER])
 
 
 class Unusual(Exception):

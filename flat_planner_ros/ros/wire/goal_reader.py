@@ -21,7 +21,7 @@ Whatever is not exactly of the usual form is left to the middleware.
 from struct import unpack_from
 
 from flat_planner_ros.core.session import Goal, GoalPoint, MAX_POINTS
-from flat_planner_ros.ros.wire.cdr_front import Front, ORDERS, Unusual
+from flat_planner_ros.ros.wire.cdr_front import Front, order_of, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS
 
 
@@ -36,7 +36,7 @@ def read_goal(data: bytes) -> Goal | None:
         may have arrays of any lengths.
 
     """
-    order = ORDERS.get(data[:2])
+    order = order_of(data)
     if order is None:
         return None
     front = Front(data, order)

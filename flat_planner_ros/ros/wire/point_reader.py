@@ -23,7 +23,7 @@ form is left to the middleware.
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
-from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, ORDERS, Unusual
+from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, order_of, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
 import numpy as np
 
@@ -90,7 +90,7 @@ def read_points(data: bytes) -> PointTable | None:
         not looked at, by the middleware neither: rclpy leaves room there.
 
     """
-    order = ORDERS.get(data[:2])
+    order = order_of(data)
     if order is None:
         return None
     front = Front(data, order)

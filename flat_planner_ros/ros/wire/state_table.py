@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import SampleTable
-from flat_planner_ros.ros.wire.cdr_front import DOUBLE, Front, HEADER, LENGTH, ORDERS, Unusual
+from flat_planner_ros.ros.wire.cdr_front import DOUBLE, Front, HEADER, LENGTH, order_of, Unusual
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +57,7 @@ def read_states(messages: Sequence[bytes]) -> StateTable | None:
 
     """
     first = messages[0]
-    order = ORDERS.get(first[:2])
+    order = order_of(first)
     if order is None:
         return None
     front = Front(first, order)
