@@ -98,7 +98,9 @@ def test_a_law_is_the_sum_of_its_terms(mp):
     scale = np.abs(expected).max(axis=1, keepdims=True)
     assert (np.abs(law.jet(times, TOP) - expected) <= 2e-13 * scale).all()
     for order in range(TOP + 1):
-        np.testing.assert_array_equal(law.jet(times, order), law.jet(times, TOP)[: order + 1])
+        # Products of other shapes may round the last bit in another way.
+        expected = law.jet(times, TOP)[: order + 1]
+        np.testing.assert_allclose(law.jet(times, order), expected, rtol=4e-16)
 
 
 @pytest.mark.parametrize('rate', [1e3, 1e6, 1e9, 1e12])

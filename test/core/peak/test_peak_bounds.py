@@ -36,6 +36,7 @@ from flat_planner_ros.core.planning import (
 )
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
 HEAVY = PlanarArm.reduced(inertia_star=(6.4e-4, 2.5e-4), stiffness=2.3e-2, damping=2e-5)
@@ -155,7 +156,7 @@ def residual_from(drive, start, duration, settings, stiffness, damping):
     knots = np.linspace(0.0, duration, len(found.samples))
     drive_at = np.interp(fine, knots, found.samples)
     angle, rate = -last / ARM.stiffness * start[2:4]
-    driven = gain * np.trapezoid(drive_at * np.exp(pole * (duration - fine)), fine)
+    driven = gain * trapezoid(drive_at * np.exp(pole * (duration - fine)), fine)
     return abs(np.exp(pole * duration) * (rate - np.conj(pole) * angle) - driven) / pole.imag
 
 

@@ -27,7 +27,7 @@ from flat_planner_ros.core.peak import (
 from flat_planner_ros.core.plant import EffortProfile, SimulatedArm
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad, solve_ivp, trapezoid
 from scipy.optimize import fsolve
 
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
@@ -118,7 +118,7 @@ def test_the_switching_function_weighs_every_motion_alike():
         law = peak_motion(ARM, duration, other, 1.0).law
         times = np.linspace(0.0, duration, 200_001)
         weighed = effort(law, times) * one.switching.at(duration - times)
-        assert np.trapezoid(weighed, times) == pytest.approx(one.target, rel=1e-6)
+        assert trapezoid(weighed, times) == pytest.approx(one.target, rel=1e-6)
         assert np.abs(effort(law, times)).max() > one.least_peak
 
 
@@ -204,7 +204,7 @@ def test_insensitive_motions_leave_less_on_other_arms():
         times = np.linspace(0.0, duration, 20_001)
         drive = pi * effort(law, times)
         pole = 1.02 * pole_of(ARM)
-        left[insensitive] = abs(np.trapezoid(drive * np.exp(pole * (duration - times)), times))
+        left[insensitive] = abs(trapezoid(drive * np.exp(pole * (duration - times)), times))
     assert left[True] < 0.1 * left[False]
 
 

@@ -40,6 +40,7 @@ from flat_planner_ros.core.planning import (
 )
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
 LIMIT = 0.015
@@ -101,7 +102,7 @@ def test_samples_contain_the_corners_of_the_effort(period):
 def test_figures_are_those_of_a_fine_grid():
     found = plan(request(), ARM, OPTIONS)
     fine = found.sample(1e-5)
-    rms = np.sqrt(np.trapezoid(fine.efforts[:, 0] ** 2, fine.times))
+    rms = np.sqrt(trapezoid(fine.efforts[:, 0] ** 2, fine.times))
     assert found.rms_effort[0] == pytest.approx(rms, rel=1e-6)
     positions, velocities, efforts = extrema_of(found)
     assert efforts.peak[0] == pytest.approx(np.abs(fine.efforts[:, 0]).max(), rel=1e-9)
