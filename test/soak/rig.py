@@ -306,7 +306,8 @@ class Soak(Rig):
     def _ended(self, verdict: dict[str, str]) -> list[dict[str, str]]:
         """Return how an accepted goal has ended."""
         plan_id = verdict['plan_id']
-        states = ('FINISHED', 'STOPPED')
+        # FAILED: its command was lost or late, which is looked at after its report.
+        states = ('FINISHED', 'STOPPED', 'FAILED')
         return [v for v in self._all() if v['state'] in states and v['plan_id'] == plan_id]
 
     def _report_of(self, end: float) -> list[dict[str, str]]:
