@@ -26,7 +26,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray
-from flat_planner_ros.core.model_fit.signals import derivatives, Segment
+from flat_planner_ros.core.model_fit.signals import derivative, Segment
 import numpy as np
 import numpy.typing as npt
 
@@ -172,7 +172,7 @@ def _covariances(
     impulse = np.zeros((2 * half + 1, 1))
     impulse[half] = smoothing.noise
     times = np.linspace(0.0, 2 * half * period, impulse.size)
-    own, other = (derivatives(times, impulse, s.span)[1][:, 0] for s in (smoothing, longer))
+    own, other = (derivative(times, impulse, s.span, 1)[:, 0] for s in (smoothing, longer))
     lags = np.linspace(-times[-1], times[-1], 2 * own.size - 1)
     return lags, np.correlate(own, own, mode='full'), float(np.sum((other - own) ** 2))
 

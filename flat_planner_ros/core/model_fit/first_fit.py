@@ -35,7 +35,7 @@ from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
 from flat_planner_ros.core.model_fit.observation import LONGER
 from flat_planner_ros.core.model_fit.refinement import neighbours
 from flat_planner_ros.core.model_fit.scales import FRICTION_SHARE, OFFSET_SCALE
-from flat_planner_ros.core.model_fit.signals import derivatives, span_for, stretches
+from flat_planner_ros.core.model_fit.signals import derivative, span_for, stretches
 from flat_planner_ros.core.model_fit.weak_form import OVERLAP, Windows
 import numpy as np
 
@@ -221,7 +221,7 @@ def _signals(
         windows = Windows(grid, length, POWER)
         absolute = np.cumsum(measurements.positions[first:last], axis=1)[:, :-1]
         angles = np.column_stack([np.interp(grid, times, column) for column in absolute.T])
-        (rates,) = derivatives(grid, angles, span, orders=(1,))
+        rates = derivative(grid, angles, span, 1)
         joints = np.diff(rates, axis=1, prepend=0.0)
         known, efforts = times[::every], measurements.efforts[first:last:every].T
         signals = ChainSignals(

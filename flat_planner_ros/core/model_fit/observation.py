@@ -28,7 +28,7 @@ from flat_planner_ros.core.model_fit.measurements import (
     noise_of,
 )
 from flat_planner_ros.core.model_fit.signals import (
-    derivatives,
+    derivative,
     FEWEST,
     interpolated,
     segments_of,
@@ -74,7 +74,7 @@ def observed_of(
         )
     times, shown = measurements.times, _shown(measurements)
     span = max(SMOOTHING * period, FEWEST * measurements.period)
-    (rates,) = derivatives(times, shown, span, orders=(1,))
+    rates = derivative(times, shown, span, 1)
     base = base_rate(measurements, base_smoothing(measurements, period))
     cuts = sudden_changes(measurements.efforts[:, -1]) if measurements.are_held else []
     segments = segments_of(times, measurements.period, SEGMENT * period, cuts)
@@ -124,7 +124,7 @@ def _turning(
     times: FloatArray, shown: FloatArray, rates: FloatArray, span: float
 ) -> npt.NDArray[np.float32]:
     """Return `Observed.turning`, of angles and velocities as they are shown (m, 2)."""
-    (accelerations,) = derivatives(times, shown, span, orders=(2,))
+    accelerations = derivative(times, shown, span, 2)
     both = (np.cumsum(each, axis=1) for each in (rates, accelerations))
     return turning_of(shown[:, 1], *both).astype(np.float32)
 
@@ -134,7 +134,7 @@ def base_rate(measurements: Measurements, smoothing: Smoothing) -> FloatArray:
     angle = measurements.positions[:, :-2].sum(axis=1, keepdims=True)
     if float(angle.std()) <= STILL * smoothing.noise:
         return np.broadcast_to(0.0, measurements.times.size)
-    return derivatives(measurements.times, angle, smoothing.span, orders=(1,))[0][:, 0]
+    return derivative(measurements.times, angle, smoothing.span, 1)[:, 0]
 
 
 def base_smoothing(measurements: Measurements, period: float) -> Smoothing:

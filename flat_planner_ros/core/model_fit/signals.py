@@ -168,15 +168,11 @@ def span_for(noise: float, period: float, longest: float) -> float:
     return max(min(wanted, longest), FEWEST * period)
 
 
-def derivatives(
-    times: FloatArray,
-    angles: FloatArray,
-    width: float,
-    degree: int = 4,
-    orders: Sequence[int] = (0, 1, 2),
-) -> tuple[FloatArray, ...]:
+def derivative(
+    times: FloatArray, angles: FloatArray, width: float, order: int, degree: int = 4
+) -> FloatArray:
     """
-    Return smoothed angles and their first two derivatives, or those asked for, each as (m, n).
+    Return a derivative of smoothed angles, shape (m, n).
 
     A polynomial is fitted around every sample (Savitzky and Golay 1964), on an even grid of the
     usual period to which uneven samples are brought first.
@@ -187,10 +183,10 @@ def derivatives(
         Samples, shapes (m,) [s] and (m, n) [rad].
     width
         Time that the polynomials span [s].
+    order
+        Of the derivative, 0 to 2.
     degree
         Of the polynomials.
-    orders
-        Of the derivatives.
 
     """
     period = float(np.median(np.diff(times)))
@@ -199,29 +195,39 @@ def derivatives(
     window = min(max(2 * round(width / period / 2) + 1, degree + 3 - degree % 2), count)
     window -= 1 - window % 2
     spacing = float(grid[1] - grid[0])
-    found = tuple(np.empty_like(angles) for _ in orders)
+    weights = _smoothing(window, degree, spacing, order)
+    found = np.empty_like(angles)
     # One by one: a recording may be long.
     for place, column in enumerate(angles.T):
-        even = np.interp(grid, times, column)
-        for result, order in zip(found, orders, strict=True):
-            smooth = _smoothed(even, window, degree, spacing, order)
-            result[:, place] = np.interp(times, grid, smooth)
+        smooth = _smoothed(np.interp(grid, times, column), *weights)
+        found[:, place] = np.interp(times, grid, smooth)
     return found
 
 
-def _smoothed(
-    even: FloatArray, window: int, degree: int, spacing: float, order: int
-) -> FloatArray:
-    """Return a derivative of even samples (m,) by polynomials over a window of samples."""
+def _smoothing(
+    window: int, degree: int, spacing: float, order: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return weights of a window's samples in a derivative: before its middle, in it, behind."""
     # Not scipy's: its signal processing alone takes 40 MB and a second to load.
     half = window // 2
     places = np.arange(-half, half + 1) * spacing
     scale = half * spacing
     fit = np.linalg.pinv(np.vander(places / scale, degree + 1, increasing=True))
     rows = np.polynomial.polynomial.polyder(fit, order) / scale**order
-    inside = np.correlate(even, rows[0], mode='valid')
     powers = np.vander(places / scale, degree + 1 - order, increasing=True)
+    return powers[:half] @ rows, rows[0], powers[half + 1 :] @ rows
+
+
+def _smoothed(
+    even: FloatArray, before: FloatArray, inside: FloatArray, behind: FloatArray
+) -> FloatArray:
+    """Return a derivative of even samples (m,) by the weights of a window."""
+    window = inside.size
     # At both ends the polynomial of the last whole window goes on.
-    before = powers[:half] @ rows @ even[:window]
-    after = powers[half + 1 :] @ rows @ even[-window:]
-    return np.concatenate((before, inside, after))
+    return np.concatenate(
+        (
+            before @ even[:window],
+            np.correlate(even, inside, mode='valid'),
+            behind @ even[-window:],
+        )
+    )

@@ -21,20 +21,15 @@ from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS
 HEADER = 4
 """Bytes of the encapsulation; offsets count from its end."""
 
-# By the representation that a message states, and no options.
-_ORDERS = {b'\0\0\0\0': '>', b'\0\1\0\0': '<'}
+ORDERS = {b'\0\0\0\0': '>', b'\0\1\0\0': '<'}
+"""
+Byte order by the representation that a message states: plain CDR, big or little endian.
+
+With options it is another form: some implementations count bytes there that do not belong to it.
+"""
 
 LENGTH, DOUBLE = 4, 8
 """Bytes of a sequence's length and of a number; each is aligned to its own size."""
-
-
-def order_of(data: bytes) -> str | None:
-    """
-    Return the byte order of a message in plain CDR; None if it is of another form.
-
-    One that states options is: some implementations count bytes there that do not belong to it.
-    """
-    return _ORDERS.get(data[:HEADER])
 
 
 class Unusual(Exception):
@@ -49,19 +44,28 @@ class Front:
     ----------
     data
         The message.
-    order
-        Byte order of the message.
 
     Attributes
     ----------
+    order
+        Byte order of the message.
     at
         Offset of the next entry from the end of the encapsulation.
     padding
         Bytes that were passed for alignment: they mean nothing, and may be anything.
 
+    Raises
+    ------
+    Unusual
+        The message is not in plain CDR; of the methods, it does not go on as it has to.
+
     """
 
-    def __init__(self, data: bytes, order: str) -> None:
+    def __init__(self, data: bytes) -> None:
+        order = ORDERS.get(data[:HEADER])
+        if order is None:
+            raise Unusual
+        self.order = order
         self._data = data
         self._length = Struct(f'{order}I')
         self._stamp = f'{order}iI'
@@ -76,10 +80,13 @@ class Front:
 
     def trajectory(self) -> tuple[float, tuple[str, ...], int]:
         """Return the stamp of a JointTrajectory [s], its joints and how many points follow."""
+        return *self.joints(), self.length(ARRAYS * LENGTH)
+
+    def joints(self) -> tuple[float, tuple[str, ...]]:
+        """Return the stamp of a header [s], and the names of joints that follow."""
         stamp = self.stamp()
         self.string()
-        names = tuple([self.string() for _ in range(self.length(LENGTH))])
-        return stamp, names, self.length(ARRAYS * LENGTH)
+        return stamp, tuple([self.string() for _ in range(self.length(LENGTH))])
 
     def length(self, size: int) -> int:
         """Return the length of a sequence whose entries take at least some bytes each."""

@@ -21,7 +21,7 @@ Whatever is not exactly of the usual form is left to the middleware.
 from struct import unpack_from
 
 from flat_planner_ros.core.session import Goal, GoalPoint, MAX_POINTS
-from flat_planner_ros.ros.wire.cdr_front import Front, order_of, Unusual
+from flat_planner_ros.ros.wire.cdr_front import Front, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS
 
 
@@ -36,24 +36,22 @@ def read_goal(data: bytes) -> Goal | None:
         may have arrays of any lengths.
 
     """
-    order = order_of(data)
-    if order is None:
-        return None
-    front = Front(data, order)
     try:
+        front = Front(data)
         stamp, names, count = front.trajectory()
         if count > MAX_POINTS:
             return None
-        points = tuple([_point(front, data, order) for _ in range(count)])
+        points = tuple([_point(front, data) for _ in range(count)])
     except Unusual:
         return None
     return Goal(joint_names=names, points=points, stamp=stamp or None)
 
 
-def _point(front: Front, data: bytes, order: str) -> GoalPoint:
+def _point(front: Front, data: bytes) -> GoalPoint:
     """Return the point that comes next."""
     positions, velocities, accelerations, effort = (
-        unpack_from(f'{order}{width}d', data, begin) for begin, width in front.numbers(ARRAYS)
+        unpack_from(f'{front.order}{width}d', data, begin)
+        for begin, width in front.numbers(ARRAYS)
     )
     return GoalPoint(
         time=front.stamp(),

@@ -23,7 +23,7 @@ form is left to the middleware.
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
-from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, order_of, Unusual
+from flat_planner_ros.ros.wire.cdr_front import Front, HEADER, Unusual
 from flat_planner_ros.ros.wire.point_writer import ARRAYS, NANOSECONDS, point_type
 import numpy as np
 
@@ -90,11 +90,8 @@ def read_points(data: bytes) -> PointTable | None:
         not looked at, by the middleware neither: rclpy leaves room there.
 
     """
-    order = order_of(data)
-    if order is None:
-        return None
-    front = Front(data, order)
     try:
+        front = Front(data)
         stamp, names, count = front.trajectory()
         if not count:
             return None
@@ -102,8 +99,8 @@ def read_points(data: bytes) -> PointTable | None:
         widths = [width for _, width in front.numbers(ARRAYS)]
     except Unusual:
         return None
-    first = point_type(start, widths, order)
-    other = point_type(start + first.itemsize, widths, order)
+    first = point_type(start, widths, front.order)
+    other = point_type(start + first.itemsize, widths, front.order)
     rest = HEADER + start + first.itemsize
     if rest + (count - 1) * other.itemsize > len(data):
         return None

@@ -74,7 +74,7 @@ def trajectory_bytes(
 
     """
     text = [LENGTH.pack(len(names)), *map(string_bytes, names), LENGTH.pack(len(times))]
-    front = b''.join([ENCAPSULATION, STAMP.pack(*stamp), string_bytes(''), *text])
+    front = b''.join([header_bytes(stamp), *text])
     # Every point but the first begins where one ends, hence they are all aligned alike.
     body = len(front) - len(ENCAPSULATION)
     widths = [table.shape[1] for table in tables] + [0] * (ARRAYS - len(tables))
@@ -95,6 +95,11 @@ def trajectory_bytes(
     head = front + LENGTH.pack(widths[0]) + bytes(max(begin - len(front), 0))
     message[: len(head)] = np.frombuffer(head, dtype=np.uint8)
     return message.tobytes()
+
+
+def header_bytes(stamp: tuple[int, int]) -> bytes:
+    """Return how a message begins: its representation, and a header with a stamp and no frame."""
+    return ENCAPSULATION + STAMP.pack(*stamp) + string_bytes('')
 
 
 def string_bytes(text: str) -> bytes:

@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import SampleTable
-from flat_planner_ros.ros.wire.cdr_front import DOUBLE, Front, HEADER, LENGTH, order_of, Unusual
+from flat_planner_ros.ros.wire.cdr_front import DOUBLE, Front, HEADER, LENGTH, Unusual
 from flat_planner_ros.ros.wire.point_writer import NANOSECONDS
 import numpy as np
 from numpy.typing import NDArray
@@ -57,14 +57,9 @@ def read_states(messages: Sequence[bytes]) -> StateTable | None:
 
     """
     first = messages[0]
-    order = order_of(first)
-    if order is None:
-        return None
-    front = Front(first, order)
     try:
-        front.stamp()
-        front.string()
-        names = [front.string() for _ in range(front.length(LENGTH))]
+        front = Front(first)
+        _, names = front.joints()
         places = front.numbers(ARRAYS)
     except Unusual:
         return None
@@ -74,12 +69,12 @@ def read_states(messages: Sequence[bytes]) -> StateTable | None:
         table[:, gap] = 0
     if places[0][1] != len(names) or not _is_one_form(table, places):
         return None
-    seconds, parts = (_column(table, STAMP, f'{order}{kind}4') for kind in 'iu')
+    seconds, parts = (_column(table, STAMP, f'{front.order}{kind}4') for kind in 'iu')
     times = seconds[:, 0] + parts[:, 1] / NANOSECONDS
     if not times.all():
         return None  # Without a stamp: the time of arrival counts.
     position, velocity, effort = (
-        _column(table, slice(begin, begin + DOUBLE * width), f'{order}f8')
+        _column(table, slice(begin, begin + DOUBLE * width), f'{front.order}f8')
         if width == len(names)
         else None
         for begin, width in places
@@ -87,7 +82,7 @@ def read_states(messages: Sequence[bytes]) -> StateTable | None:
     if position is None:
         return None
     samples = SampleTable(times=times, positions=position, velocities=velocity, efforts=effort)
-    return StateTable(names, samples)
+    return StateTable(list(names), samples)
 
 
 def _is_one_form(table: Bytes, places: Sequence[tuple[int, int]]) -> bool:

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.ros.wire.point_writer import ENCAPSULATION, LENGTH, STAMP, string_bytes
+from flat_planner_ros.ros.wire.point_writer import header_bytes, LENGTH, string_bytes
 
 KEYS_KEPT = 256
 """Keys that are remembered in serialised form."""
@@ -73,7 +73,7 @@ def array_bytes(status: Status, stamp: tuple[int, int]) -> bytes:
         Seconds and nanoseconds of the header.
 
     """
-    parts = [ENCAPSULATION, STAMP.pack(*stamp), string_bytes(''), LENGTH.pack(1)]
+    parts = [header_bytes(stamp), LENGTH.pack(1)]
     parts += [status.level, bytes(LENGTH.size - len(status.level))]
     parts += map(string_bytes, (status.name, status.message, status.hardware_id))
     parts.append(LENGTH.pack(len(status.values)))

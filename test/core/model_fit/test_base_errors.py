@@ -15,7 +15,7 @@
 """Errors of the velocity of link n-2: as large as noise makes them, where friction turns."""
 
 from flat_planner_ros.core.model_fit.base_errors import base_errors_of, BaseErrors, Smoothing
-from flat_planner_ros.core.model_fit.signals import derivatives, Segment
+from flat_planner_ros.core.model_fit.signals import derivative, Segment
 import numpy as np
 import pytest
 
@@ -35,7 +35,7 @@ def test_the_covariance_is_that_of_smoothed_noise():
     errors = expected(0.0 * TIMES)
     nodes, root = errors.nodes[0], errors.roots[0]
     angles = NOISE * np.random.default_rng(1).standard_normal((TIMES.size, 4000))
-    rates = derivatives(TIMES, angles, SPAN)[1]
+    rates = derivative(TIMES, angles, SPAN, 1)
     inside = (nodes > SPAN) & (nodes < 1.0 - SPAN)
     seen = np.cov([np.interp(nodes[inside], TIMES, rate) for rate in rates.T], rowvar=False)
     stated = (root @ root.T)[np.ix_(inside, inside)]
