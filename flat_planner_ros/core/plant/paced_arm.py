@@ -336,8 +336,7 @@ class PacedArm:
         due = [index * self._per_sample * step for index in range(begun, self._sampled)]
         passed = self._simulated.advance_through(due, target * step)
         samples = [
-            self._sensor.measure(state._replace(time=self._offset + state.time))
-            for state in passed
+            self._sensor.measure(ArmState(self._offset + time, *seen)) for time, *seen in passed
         ]
         if self._simulated.take_expired():
             self._incidents.broken = self._settings.input_timeout

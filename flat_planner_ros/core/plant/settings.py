@@ -77,9 +77,12 @@ class Sensor:
         """Start the noise."""
         self._sensing = sensing
         self._random = np.random.default_rng(sensing.seed)
+        self._is_ideal = not (sensing.position_std or sensing.resolution)
 
     def measure(self, state: ArmState) -> ArmState:
         """Return a state as it is measured."""
+        if self._is_ideal:
+            return state
         position = state.position
         if self._sensing.position_std:
             noise = self._random.standard_normal(position.size)

@@ -111,9 +111,10 @@ class LinearSteps(NamedTuple):
             # Motor by motor, so that a step does not depend on how many others there are.
             for motor, answer in enumerate(of_motors):
                 driven += np.multiply.outer(present[:, motor], answer)
-        state, carry = first, self.from_state.dot
+        state, carry, carried = first, self.from_state.dot, np.empty(len(first))
         for row in driven:
-            row += carry(state)
+            carry(state, carried)
+            row += carried
             state = row
         return table
 

@@ -28,8 +28,10 @@ from flat_planner_ros.ros.parameters.node_parameters import NodeParameters
 from flat_planner_ros.ros.parameters.plant import build, CommandInput, PlantSettings, ROWS
 from flat_planner_ros.ros.parameters.row import InvalidParameter
 from flat_planner_ros.ros.wire import conversions, interfaces, stamps
+from flat_planner_ros.ros.wire.joint_state_writer import clock_bytes, JointStateWriter
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -59,6 +61,8 @@ class PlantNode(GuardedNode):
         self._joint_states = self.create_publisher(
             JointState, interfaces.JOINT_STATES, interfaces.RELIABLE
         )
+        self._writer = JointStateWriter(settings.joints)
+        self._graph_time: Publisher | None = None
         if settings.publish_clock:
             self._graph_time = self.create_publisher(Clock, interfaces.CLOCK, interfaces.RELIABLE)
         self._listen()
@@ -171,10 +175,11 @@ class PlantNode(GuardedNode):
 
     def _publish(self, sample: ArmState) -> None:
         """Publish a sample; its time first, so that nobody sees it before its time."""
-        msg = conversions.joint_state_msg(sample, self._settings.joints)
-        if self._settings.publish_clock:
-            self._graph_time.publish(Clock(clock=msg.header.stamp))
-        self._joint_states.publish(msg)
+        time, *numbers = sample
+        stamp = stamps.sec_and_nanosec(time)
+        if self._graph_time is not None:
+            self._graph_time.publish(clock_bytes(stamp))
+        self._joint_states.publish(self._writer.message(stamp, *numbers))
 
     def _on_watch(self) -> None:
         """Say what went wrong, with numbers, at most once per period."""

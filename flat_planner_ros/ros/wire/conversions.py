@@ -47,7 +47,7 @@ from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory
 
 if TYPE_CHECKING:
-    from flat_planner_ros.core.plant import ArmState, EffortProfile
+    from flat_planner_ros.core.plant import EffortProfile
 
 Message = TypeVar('Message')
 
@@ -340,14 +340,11 @@ def effort_msg(efforts: FloatArray) -> Float64MultiArray:
 
 def reference_msg(samples: PlanSamples, joints: Sequence[str], now: float) -> JointState:
     """Return what is planned for the present time."""
-    return _joint_state_msg(
-        joints, now, samples.positions[0], samples.velocities[0], samples.efforts[0]
-    )
-
-
-def joint_state_msg(state: ArmState, joints: Sequence[str]) -> JointState:
-    """Return the state of the plant."""
-    return _joint_state_msg(joints, state.time, state.position, state.velocity, state.effort)
+    msg = JointState(name=list(joints))
+    msg.header.stamp = stamps.time_msg(now)
+    msg.position, msg.velocity = _doubles(samples.positions[0]), _doubles(samples.velocities[0])
+    msg.effort = _doubles(samples.efforts[0])
+    return msg
 
 
 def residual_msg(header: Header, joints: Sequence[str], residual: Residual) -> JointState:
@@ -355,21 +352,6 @@ def residual_msg(header: Header, joints: Sequence[str], residual: Residual) -> J
     msg = JointState(header=header, name=joints, position=_doubles(residual.positions))
     if residual.velocities is not None:
         msg.velocity = _doubles(residual.velocities)
-    return msg
-
-
-def _joint_state_msg(
-    joints: Sequence[str],
-    time: float,
-    position: FloatArray,
-    velocity: FloatArray,
-    effort: FloatArray,
-) -> JointState:
-    """Return a joint state with full arrays."""
-    msg = JointState(name=list(joints))
-    msg.header.stamp = stamps.time_msg(time)
-    msg.position, msg.velocity = _doubles(position), _doubles(velocity)
-    msg.effort = _doubles(effort)
     return msg
 
 
