@@ -66,38 +66,60 @@ class BaseErrors(NamedTuple):
         """Return those of some of the segments."""
         return BaseErrors(self.nodes[block], self.roots[block], self.spacing)
 
-    def at(self, grid: FloatArray, units: FloatArray) -> FloatArray:
+    def near(self, grid: FloatArray) -> 'Near':
+        """Return the nodes that act at rising times, shape (g, segments) [s]."""
+        begins, ends = grid[0, :, None], grid[-1, :, None]
+        first = np.count_nonzero(self.nodes <= begins - self.spacing, axis=1)
+        last = np.count_nonzero(self.nodes < ends + self.spacing, axis=1)
+        places = first[:, None] + np.arange(int((last - first).max()))
+        beyond = np.pad(self.nodes, ((0, 0), (0, places.shape[1])), constant_values=np.inf)
+        away = np.abs(grid[:, :, None] - np.take_along_axis(beyond, places, axis=1))
+        return Near(first, np.maximum(1.0 - away / self.spacing, 0.0))
+
+
+class Near(NamedTuple):
+    """
+    The nodes that act at some times.
+
+    Attributes
+    ----------
+    first
+        Of each segment, shape (segments,).
+    shares
+        Of the values at these nodes, shape (g, segments, nodes) [-].
+
+    """
+
+    first: npt.NDArray[np.intp]
+    shares: FloatArray
+
+    def between(self, values: FloatArray) -> FloatArray:
+        """Return values at all nodes, (segments, K), between them, shape (g, segments)."""
+        count = self.shares.shape[-1]
+        padded = np.pad(values, ((0, 0), (0, count)))
+        own = np.take_along_axis(padded, self.first[:, None] + np.arange(count), axis=1)
+        found: FloatArray = np.einsum('gsn,sn->gs', self.shares, own)
+        return found
+
+    def added(self, carried: FloatArray, begun: FloatArray, segment: int) -> FloatArray:
         """
-        Return the errors of the velocity.
+        Return derivatives by a state and by values at all nodes, shape (..., states + K).
 
         Parameters
         ----------
-        grid
-            Times, shape (g, segments) [s].
-        units
-            Unknowns of unit covariance, shape (models, K, segments) [-].
-
-        Returns
-        -------
-        FloatArray
-            Shape (g, models, segments) [rad/s].
+        carried
+            By a state before these nodes act, and by the values at them, shape (..., states + n).
+        begun
+            Derivatives of that state, shape (states, states + K).
+        segment
+            Whose nodes they are.
 
         """
-        return self._between(grid, self.roots @ units.transpose(2, 1, 0)).transpose(0, 2, 1)
-
-    def slopes(self, grid: FloatArray) -> FloatArray:
-        """Return the derivatives of the errors by the unknowns, shape (g, segments, K) [rad/s]."""
-        return self._between(grid, self.roots)
-
-    def _between(self, grid: FloatArray, values: FloatArray) -> FloatArray:
-        """Return values at the nodes (segments, K, c) between them, shape (g, segments, c)."""
-        found = np.zeros((*grid.shape, values.shape[-1]))
-        for number, (times, nodes) in enumerate(zip(grid.T, self.nodes, strict=True)):
-            after = np.searchsorted(nodes, times)
-            for node in (after - 1, np.minimum(after, nodes.size - 1)):
-                share = 1.0 - np.abs(times - nodes[node]) / self.spacing
-                near = np.flatnonzero((share > 0.0) & (node >= 0))
-                found[near, number] += share[near, None] * values[number, node[near]]
+        states = len(begun)
+        found: FloatArray = carried[..., :states] @ begun
+        place = states + int(self.first[segment])
+        room = found[..., place : place + self.shares.shape[-1]]
+        room += carried[..., states : states + room.shape[-1]]
         return found
 
 

@@ -16,8 +16,9 @@
 How a motion depends on its start and on the velocity of the base.
 
 A step is linear in both but for Coulomb friction, whose slopes follow from the motion itself: one
-motion is simulated, and its derivatives by any number of unknowns are carried along with a matrix
-for each step, exact for the steps that are taken.
+motion is simulated, and its derivatives are carried along with a matrix for each step, exact for
+the steps that are taken. What an unknown has done before some state acts through that state alone:
+its derivatives from there on are those by the state times what it has done.
 """
 
 from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray
@@ -66,28 +67,29 @@ def step_slopes(model: FloatArray, motion: FloatArray, step: float) -> FloatArra
     return found
 
 
-def carried_on(by_step: FloatArray, begun: FloatArray, by_base: FloatArray | None) -> FloatArray:
+def carried_on(by_step: FloatArray, by_base: FloatArray | None) -> FloatArray:
     """
-    Return the derivatives of all states by unknowns, shape (K + 1, segments, 4, unknowns).
+    Return the derivatives of all states by the first one and by unknowns that act from there on.
+
+    Shape (K + 1, segments, 4, 4 + unknowns).
 
     Parameters
     ----------
     by_step
         As `step_slopes` returns it.
-    begun
-        Derivatives of the first state, shape (segments, 4, unknowns).
     by_base
-        Derivatives of the base's velocity by the last of the unknowns on a grid of half steps,
-        shape (2 K + 1, segments, last unknowns); None if none of them acts there.
+        Derivatives of the base's velocity by the unknowns on a grid of half steps, shape
+        (2 K + 1, segments, unknowns); None for no unknowns.
 
     """
-    found = np.empty((len(by_step) + 1, *begun.shape))
-    found[0], found[1:] = begun, 0.0
+    steps, segments = by_step.shape[:2]
+    unknowns = 0 if by_base is None else by_base.shape[-1]
+    found = np.zeros((steps + 1, segments, STATES, STATES + unknowns))
+    found[0, ..., :STATES] = np.eye(STATES)
     if by_base is not None:
-        places = slice(begun.shape[-1] - by_base.shape[-1], None)
-        found[1:, :, :, places] = by_step[..., STATES:] @ triples(by_base)
+        np.matmul(by_step[..., STATES:], triples(by_base), out=found[1:, ..., STATES:])
     by_state = np.ascontiguousarray(by_step[..., :STATES])
-    carried = np.empty_like(begun)
+    carried = np.empty_like(found[0])
     for matrices, before, after in zip(by_state, found[:-1], found[1:], strict=True):
         np.matmul(matrices, before, out=carried)
         after += carried

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 from flat_planner_ros.core.arm import FloatArray
-from flat_planner_ros.core.model_fit.base_errors import BaseErrors
+from flat_planner_ros.core.model_fit.base_errors import BaseErrors, Near
 from flat_planner_ros.core.model_fit.last_links import (
     COULOMB,
     DELAY,
@@ -46,9 +46,6 @@ BLOCK = 20
 
 CHUNK = 128
 """Steps whose states are held at a time: memory does not grow with the recording."""
-
-SHORTEST_CHUNK, MOST_SLOPES = 32, 80_000
-"""Steps that are worth their overhead, and derivatives of states that are held at a time [-]."""
 
 CHANNELS = 2
 """Angle of link n-1 and of the passive joint."""
@@ -154,13 +151,12 @@ def seen_of(
     """
     samples = _Samples.of(observed, block)
     seen = samples.empty(len(models))
-    for chunk in _chunks(observed, samples, models, CHUNK):
+    for chunk in _chunks(observed, samples, models):
         states = trajectories(models, starts, chunk.forcing)
         starts = states[-1]
-        samples.read(seen, chunk, states.transpose(3, 0, 2, 1))
-    for angles in seen:
-        angles[:, 1] += models[:, OFFSET]
-    return seen
+        chunk.reading.fill(seen, states.transpose(0, 3, 2, 1))
+    seen[:, 1] += models[:, OFFSET]
+    return samples.split(seen)
 
 
 def seen_with_slopes(
@@ -186,55 +182,93 @@ def seen_with_slopes(
     samples = _Samples.of(observed, block)
     own = unknowns.shape[1]
     seen, slopes = samples.empty(len(models)), samples.empty(own)
-    errors = None if observed.base_errors is None else observed.base_errors.of(block)
+    errors = None if own == STATES or not observed.base_errors else observed.base_errors.of(block)
     starts = np.broadcast_to(unknowns[:, :STATES].T, (len(models), STATES, len(unknowns)))
-    begun = np.broadcast_to(np.eye(STATES, own), (len(unknowns), STATES, own))
-    length = min(CHUNK, max(SHORTEST_CHUNK, MOST_SLOPES // (own * len(unknowns))))
-    for chunk in _chunks(observed, samples, models, length):
-        motion, by_unknown = _carried_on(chunk, errors, models, unknowns, starts, begun)
-        # Copies: what led to them need not stay.
-        starts, begun = motion[-1].copy(), by_unknown[-1].copy()
-        samples.read(seen, chunk, motion.transpose(3, 0, 2, 1))
-        samples.read(slopes, chunk, by_unknown.swapaxes(0, 1))
-        del motion, by_unknown
-    for angles in seen:
-        angles[:, 1] += models[:, OFFSET]
-    return list(zip(seen, slopes, strict=True))
+    begun = [np.eye(STATES, own)] * len(unknowns)
+    off = None if errors is None else (errors.roots @ unknowns[:, STATES:, None])[..., 0]
+    for chunk in _chunks(observed, samples, models):
+        forcing, near = chunk.forcing, None
+        if errors is not None and off is not None:
+            near = errors.near(chunk.grid)
+            forcing = forcing._replace(base=forcing.base + near.between(off)[:, None, :])
+        motion = motions(models, starts, forcing)
+        by_step = step_slopes(models[:1], motion[:, 0], forcing.step)
+        carried = carried_on(by_step, None if near is None else near.shares)
+        # A copy: what led to it need not stay.
+        starts = motion[-1, :, :STATES].copy()
+        chunk.reading.fill(seen, motion.transpose(0, 3, 2, 1)[:, :, :STATES])
+        begun = chunk.reading.fill_from(slopes, carried, begun, near)
+        del motion, by_step, carried
+    seen[:, 1] += models[:, OFFSET]
+    each = samples.split(slopes)
+    if errors is not None:
+        for by_own, root in zip(each, errors.roots, strict=True):
+            by_own[..., STATES:] = by_own[..., STATES:] @ root
+    return list(zip(samples.split(seen), each, strict=True))
 
 
-def _carried_on(
-    chunk: '_Chunk',
-    errors: BaseErrors | None,
-    models: FloatArray,
-    unknowns: FloatArray,
-    starts: FloatArray,
-    begun: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the states of a chunk and their derivatives by the unknowns, from its first ones."""
-    forcing, by_base = chunk.forcing, None
-    if errors is not None and unknowns.shape[1] > STATES:
-        off = errors.at(chunk.grid, unknowns.T[None, STATES:])
-        forcing = forcing._replace(base=forcing.base + off)
-        by_base = errors.slopes(chunk.grid)
-    motion = motions(models, starts, forcing)
-    by_step = step_slopes(models[:1], motion[:, 0], forcing.step)
-    return motion[:, :, :STATES], carried_on(by_step, begun, by_base)
+class _Reading(NamedTuple):
+    """
+    Where samples lie between the states of a chunk.
+
+    Attributes
+    ----------
+    inside
+        Which samples do, segment by segment, shape (m,).
+    segment, node, share
+        Their segment, the state before them, and where they are in the step behind it, (m,).
+    step
+        Between the states [s].
+
+    """
+
+    inside: npt.NDArray[np.intp]
+    segment: npt.NDArray[np.intp]
+    node: npt.NDArray[np.intp]
+    share: FloatArray
+    step: float
+
+    def between(self, states: FloatArray) -> FloatArray:
+        """Return both angles between states (K + 1, segments, 4, c), shape (m, 2, c)."""
+        here, there = states[self.node, self.segment], states[self.node + 1, self.segment]
+        ends = here[:, :2], there[:, :2], here[:, 2:], there[:, 2:]
+        return hermite(self.share[:, None, None], np.array(self.step), *ends)
+
+    def fill(self, seen: FloatArray, states: FloatArray) -> None:
+        """Fill in both angles, shape (samples, 2, c)."""
+        seen[self.inside] = self.between(states)
+
+    def fill_from(
+        self, slopes: FloatArray, carried: FloatArray, begun: list[FloatArray], near: Near | None
+    ) -> list[FloatArray]:
+        """Fill in derivatives by all unknowns; return those of the last state of each segment."""
+        local, ends = self.between(carried), np.searchsorted(self.segment, range(len(begun) + 1))
+        last = []
+        for number, (before, own) in enumerate(zip(begun, carried[-1], strict=True)):
+            place = slice(*ends[number : number + 2])
+            if near is None:
+                slopes[self.inside[place]] = local[place] @ before
+                last.append(own @ before)
+            else:
+                slopes[self.inside[place]] = near.added(local[place], before, number)
+                last.append(near.added(own, before, number))
+        return last
 
 
 class _Chunk(NamedTuple):
-    """Steps first ... last-1, half of them on a grid (2 K + 1, segments) [s], and what moves."""
+    """Some steps, half of them on a grid (2 K + 1, segments) [s], what moves, and samples."""
 
-    first: int
-    last: int
     grid: FloatArray
     forcing: Forcing
+    reading: _Reading
 
 
 class _Samples(NamedTuple):
-    """When each segment of a block begins (segments,) [s], and its samples since then (m,) [s]."""
+    """When each segment begins (segments,) [s], the segment of each sample, time since then."""
 
     begins: FloatArray
-    elapsed: list[FloatArray]
+    segment: npt.NDArray[np.intp]
+    elapsed: FloatArray
 
     @classmethod
     def of(cls, observed: Observed, block: slice) -> '_Samples':
@@ -242,40 +276,31 @@ class _Samples(NamedTuple):
         t, segments = observed.times, observed.segments[block]
         begins = t[[segment.first for segment in segments]]
         pairs = zip(segments, begins, strict=True)
-        return cls(begins, [t[s.first : s.last] - begin for s, begin in pairs])
+        elapsed = np.concatenate([t[s.first : s.last] - begin for s, begin in pairs])
+        sizes = [s.last - s.first for s in segments]
+        return cls(begins, np.repeat(np.arange(len(sizes)), sizes), elapsed)
 
-    def empty(self, count: int) -> list[FloatArray]:
+    def empty(self, count: int) -> FloatArray:
         """Return room for so many numbers at each sample of both channels, (m, 2, count)."""
-        return [np.empty((each.size, CHANNELS, count)) for each in self.elapsed]
+        return np.empty((self.elapsed.size, CHANNELS, count))
 
-    def read(self, seen: list[FloatArray], chunk: _Chunk, states: FloatArray) -> None:
-        """Fill in both angles of the samples in a chunk, from states (segments, K + 1, 4, ...)."""
-        step = chunk.forcing.step
-        for angles, each, own in zip(seen, self.elapsed, states, strict=True):
-            inside = slice(*np.searchsorted(each / step, (chunk.first, chunk.last)))
-            angles[inside] = _between_states(own, each[inside] / step - chunk.first, step)
+    def split(self, seen: FloatArray) -> list[FloatArray]:
+        """Return the parts of all segments."""
+        return np.split(seen, np.searchsorted(self.segment, range(1, self.begins.size)))
 
 
-def _chunks(
-    observed: Observed, samples: _Samples, models: FloatArray, length: int
-) -> Iterator[_Chunk]:
+def _chunks(observed: Observed, samples: _Samples, models: FloatArray) -> Iterator[_Chunk]:
     """Yield the steps of a block of segments, so many at a time."""
-    longest = max(float(each[-1]) for each in samples.elapsed)
     step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
-    steps = int(np.ceil(longest / step)) + 1
-    for first in range(0, steps, length):
-        last = min(first + length, steps)
+    at = samples.elapsed / step
+    steps = int(np.ceil(at.max())) + 1
+    for first in range(0, steps, CHUNK):
+        last = min(first + CHUNK, steps)
         grid = samples.begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
-        yield _Chunk(first, last, grid, _forcing(observed, models, grid, step))
-
-
-def _between_states(states: FloatArray, at: FloatArray, step: float) -> FloatArray:
-    """Return both angles between states (K + 1, 4, ...) at times [steps], shape (m, 2, ...)."""
-    node = at.astype(int)
-    share = (at - node)[:, None, None]
-    here, there = states[node], states[node + 1]
-    ends = here[:, :2], there[:, :2], here[:, 2:], there[:, 2:]
-    return hermite(share, np.array(step), *ends)
+        inside = np.flatnonzero((at >= first) & (at < last))
+        node = at[inside].astype(int)
+        reading = _Reading(inside, samples.segment[inside], node - first, at[inside] - node, step)
+        yield _Chunk(grid, _forcing(observed, models, grid, step), reading)
 
 
 def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: float) -> Forcing:

@@ -59,6 +59,22 @@ def test_errors_count_where_friction_turns_alone():
 
 def test_errors_go_straight_from_node_to_node():
     errors = BaseErrors(np.array([[0.1, 0.2, np.inf]]), np.eye(3)[None], 0.1)
-    units = np.array([[[1.0], [3.0], [9.0]]])
+    values = np.array([[1.0, 3.0, 9.0]])
     grid = np.array([[0.0], [0.05], [0.1], [0.15], [0.2], [0.3], [0.5]])
-    assert errors.at(grid, units)[:, 0, 0] == pytest.approx([0.0, 0.5, 1.0, 2.0, 3.0, 0.0, 0.0])
+    expected_of = [0.0, 0.5, 1.0, 2.0, 3.0, 0.0, 0.0]
+    assert errors.near(grid).between(values)[:, 0] == pytest.approx(expected_of)
+    for first in range(1, grid.size):
+        near = errors.near(grid[first:])
+        assert near.between(values)[:, 0] == pytest.approx(expected_of[first:])
+
+
+def test_what_nodes_did_before_acts_through_the_state():
+    errors = BaseErrors(np.array([[0.1, 0.2, 0.3]]), np.eye(3)[None], 0.1)
+    near = errors.near(np.array([[0.21], [0.25], [0.29]]))
+    assert near.first.tolist() == [1]
+    assert near.shares.shape == (3, 1, 2)
+    begun = np.arange(10.0).reshape(2, 5)
+    carried = np.arange(12.0).reshape(3, 4)
+    expected_of = carried[:, :2] @ begun
+    expected_of[:, 3:] += carried[:, 2:]
+    assert near.added(carried, begun, 0) == pytest.approx(expected_of)
