@@ -14,17 +14,17 @@
 
 """What comes of seeing a recording in another way, and which way between two explains it best."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from math import sqrt
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.judgement import correlation_lengths, covariance
-from flat_planner_ros.core.model_fit.last_links import NAMES
-from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, Refined
-from flat_planner_ros.core.model_fit.simulation import CHANNELS, Observed, SingleOrDouble
+from flat_planner_ros.core.model_fit.last_links import DELAY, NAMES
+from flat_planner_ros.core.model_fit.parts import part_of
+from flat_planner_ros.core.model_fit.refinement import left_in, Linearisation, linearised, Refined
+from flat_planner_ros.core.model_fit.simulation import blocks, CHANNELS, Observed
 import numpy as np
 
 MIDDLE, SPREAD = 0.5, 12.0**-0.5
@@ -43,32 +43,48 @@ class Change(NamedTuple):
 
     Attributes
     ----------
-    residuals
-        Weighted change of the residuals, the starts eliminated, shape (m, 2) [-].
+    shares
+        Of the ways that were tried, shape (ways,) [-].
+    products
+        Sums of products of what each of them changes in the weighted residuals, the starts
+        eliminated, and, of the first, of the residuals themselves, shape (2, ways, ways) [-].
+    samples
+        Of the recording.
     gradient, normal
         Of a sum of squares, change (2, free) and there (2, free, free), as in `Linearisation`.
 
     """
 
-    residuals: SingleOrDouble
+    shares: FloatArray
+    products: FloatArray
+    samples: int
     gradient: FloatArray
     normal: FloatArray
 
     @property
     def power(self) -> FloatArray:
         """Return the sum of squares of the residuals' change, shape (2,) [-]."""
-        power: FloatArray = (self.residuals**2).sum(axis=0, dtype=float)
-        return power
+        return self.along(self)
+
+    @property
+    def on_residuals(self) -> FloatArray:
+        """Return the sums of products of the residuals and their change, shape (2,) [-]."""
+        return self.products[:, 0] @ self.shares
+
+    def along(self, other: 'Change') -> FloatArray:
+        """Return the sums of products of two changes, shape (2,) [-]."""
+        return self.products @ other.shares @ self.shares
 
     def besides(self, other: 'Change') -> 'Change':
         """Return the change without what is like another one (least squares)."""
-        power = float(other.power.sum())
-        both = float((self.residuals * other.residuals).sum(dtype=float))
-        share = both / power if power > 0.0 else 0.0
-        return Change(
-            self.residuals - share * other.residuals,
-            self.gradient - share * other.gradient,
-            self.normal,
+        power, both = float(other.power.sum()), float(self.along(other).sum())
+        return self.since(other, both / power if power > 0.0 else 0.0)
+
+    def since(self, other: 'Change', share: float = 1.0) -> 'Change':
+        """Return the change without a share of another one."""
+        return self._replace(
+            shares=self.shares - share * other.shares,
+            gradient=self.gradient - share * other.gradient,
         )
 
     def growth_from(self, finer: 'Change') -> float:
@@ -89,7 +105,7 @@ class Change(NamedTuple):
         """Return the mean square change of the residuals that a step leaves, shape (2,) [-]."""
         by_step = 2.0 * self.gradient @ step + step @ self.normal @ step
         left: FloatArray = np.maximum(self.power + by_step, 0.0)
-        return left / len(self.residuals)
+        return left / self.samples
 
 
 class Doubt(NamedTuple):
@@ -112,16 +128,85 @@ class Doubt(NamedTuple):
     cover: float = 1.0
 
 
-def change_between(here: Linearisation, there: Linearisation, spread: FloatArray) -> Change:
-    """Return what another way to see the recording changes; `spread` is that of both."""
-    pairs = zip(there.residuals, here.residuals, strict=True)
-    residuals = np.concatenate([((new - old) / spread).astype(np.float32) for new, old in pairs])
-    return Change(residuals, there.gradient - here.gradient, there.normal)
+View: TypeAlias = Callable[[Observed], Observed]
+"""Makes of a recording, or a part of it, what else it may have been."""
+
+
+class Way(NamedTuple):
+    """How to see a recording, or a part of it; the fit's linearisation if that is there."""
+
+    see: View
+    around: Linearisation | None = None
+
+
+def changes_by(
+    ways: Sequence[Way], observed: Observed, found: Refined, free: list[int], scales: FloatArray
+) -> list[Change]:
+    """
+    Return what ways to see a recording change from the first of them, which comes without.
+
+    Parameters
+    ----------
+    ways
+        Two or more.
+    observed, found
+        A recording, and a fit to it.
+    free, scales
+        Parameters of the fit, and the scales of all.
+
+    """
+    around = [_Around.of(way, len(free)) for way in ways]
+    products, samples = np.zeros((CHANNELS, len(ways), len(ways))), 0
+    # Of a long recording the residuals are held for one block at a time.
+    for block in blocks(observed):
+        part = part_of(observed, block, float(found.parameters[DELAY]))
+        first, *others = [each.left_in(part, block, found, free, scales) for each in around]
+        rows = np.stack([first, *(other - first for other in others)], axis=-1)
+        rows /= found.spread[:, None]
+        products += rows.transpose(1, 2, 0) @ rows.transpose(1, 0, 2)
+        samples += len(first)
+    shares = np.eye(len(ways))[1:]
+    return [
+        Change(share, products, samples, there.gradient - around[0].gradient, there.normal)
+        for share, there in zip(shares, around[1:], strict=True)
+    ]
+
+
+class _Around(NamedTuple):
+    """A way, and its gradient (2, free) and normal equations (2, free, free), part by part."""
+
+    way: Way
+    gradient: FloatArray
+    normal: FloatArray
+
+    @classmethod
+    def of(cls, way: Way, free: int) -> '_Around':
+        """Return those that are known, or none as yet."""
+        if way.around is not None:
+            return cls(way, way.around.gradient, way.around.normal)
+        return cls(way, np.zeros((CHANNELS, free)), np.zeros((CHANNELS, free, free)))
+
+    def left_in(
+        self, part: Observed, block: slice, found: Refined, free: list[int], scales: FloatArray
+    ) -> FloatArray:
+        """Add up a block, and return what is left in it, (samples, 2) [rad]."""
+        if self.way.around is not None:
+            return np.concatenate(left_in(part, block, found), dtype=float)
+        point = found.parameters, found.starts[block], free, scales, found.spread
+        there = linearised(self.way.see(part), *point, keeps=True)
+        self.gradient[...] += there.gradient
+        self.normal[...] += there.normal
+        return np.concatenate(there.residuals, dtype=float)
 
 
 def straighter(observed: Observed) -> Observed:
     """Return a recording whose efforts go straighter from sample to sample, by 1."""
     return replace(observed, straightness=observed.straightness + 1.0)
+
+
+def as_it_is(observed: Observed) -> Observed:
+    """Return a recording as it is."""
+    return observed
 
 
 def straightness(
@@ -144,15 +229,13 @@ def straightness(
     straight from point to point on lines if each point is sampled, and between if some are.
 
     """
-    point = found.parameters, found.starts, free, scales, found.spread
-    there = linearised(straighter(observed), *point)
-    change = change_between(found.around, there, found.spread)
+    ways = Way(as_it_is, found.around), Way(straighter)
+    (change,) = changes_by(ways, observed, found, free, scales)
     step = change.step(scales[free])
     alike = max(correlation_lengths(found.around))
-    told = float(change.left(step).sum()) * len(change.residuals) / alike
-    left = np.concatenate(found.around.residuals)
-    along = (left * change.residuals).sum(axis=0, dtype=float) / found.spread
-    slope = float(along.sum() + found.around.gradient.sum(axis=0) @ step) / alike
+    told = float(change.left(step).sum()) * change.samples / alike
+    along = change.on_residuals.sum() + found.around.gradient.sum(axis=0) @ step
+    slope = float(along) / alike
     whole = told + SPREAD**-2
     pull = slope + (observed.straightness - MIDDLE) / SPREAD**2
     return observed.straightness - pull / whole, whole**-0.5
@@ -169,16 +252,10 @@ def errors_of(
     own = scales[free]
     inside = covariance(found.around, own) * np.outer(own, own)
     left = np.zeros(CHANNELS)
-    # By `map` no change outlives its numbers: a recording may be long.
-    for step, remains in map(partial(_answered, scales=own), doubts):
-        inside += np.outer(step, step)
-        left += found.spread**2 * remains
+    for doubt in doubts:
+        step = doubt.change.step(own)
+        inside += np.outer(doubt.weight * step, doubt.weight * step)
+        left += (found.spread * doubt.cover * doubt.weight) ** 2 * doubt.change.left(step)
     whole = np.zeros((len(NAMES), len(NAMES)))
     whole[np.ix_(free, free)] = inside
     return whole, np.sqrt(left)
-
-
-def _answered(doubt: Doubt, scales: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a doubt's error of the parameters, and the mean square that it leaves (2,) [-]."""
-    step = doubt.change.step(scales)
-    return doubt.weight * step, (doubt.cover * doubt.weight) ** 2 * doubt.change.left(step)

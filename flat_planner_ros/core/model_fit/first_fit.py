@@ -18,6 +18,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray, PlanarArm
+from flat_planner_ros.core.model_fit.correlation import correlation_length, lags_for, products
 from flat_planner_ros.core.model_fit.first_links import (
     Chain,
     ChainSignals,
@@ -30,7 +31,6 @@ from flat_planner_ros.core.model_fit.first_links import (
     rows,
     VISCOUS,
 )
-from flat_planner_ros.core.model_fit.judgement import correlation_length
 from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
 from flat_planner_ros.core.model_fit.observation import LONGER
 from flat_planner_ros.core.model_fit.refinement import neighbours
@@ -328,7 +328,8 @@ def _alike(around: _Rows) -> float:
     used = [
         left[weight > 0.0] for left, weight in zip(around.left.T, around.weights.T, strict=True)
     ]
-    lengths = [correlation_length([each]) for each in used if each.size > OVERLAP]
+    sums = [products(each[:, None], lags_for([each.size])) for each in used if each.size > OVERLAP]
+    lengths = [correlation_length(each[0]) for each in sums]
     return float(np.clip(max(lengths, default=OVERLAP), LEAST_ALIKE, OVERLAP))
 
 

@@ -36,7 +36,10 @@ from flat_planner_ros.core.model_fit.last_links import (
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
 from flat_planner_ros.core.model_fit.observation import noise_of_links
+from flat_planner_ros.core.model_fit.parts import part_of
+from flat_planner_ros.core.model_fit.refinement import left_in, Refined
 from flat_planner_ros.core.model_fit.scales import vector_of
+from flat_planner_ros.core.model_fit.simulation import blocks, Observed
 from flat_planner_ros.core.model_fit.table import entries, Entry
 import numpy as np
 import numpy.typing as npt
@@ -158,9 +161,6 @@ def _result(
 ) -> ModelFit:
     """Put numbers into words."""
     observed, around = last.observed, last.found.around
-    residuals = np.full(observed.angles.shape, np.nan)
-    for segment, part in zip(observed.segments, around.residuals, strict=True):
-        residuals[segment.first : segment.last] = part
     noise = noise_of_links(measurements)
     explained = np.hypot(noise, last.by_inputs)
     doubts = [doubt(around, last.found.spread, explained, observed.angles.std(axis=0))]
@@ -171,13 +171,24 @@ def _result(
         estimates=_estimates(start, whole),
         effort_scale=whole.effort_scale,
         times=measurements.times,
-        residuals=residuals,
+        residuals=_residuals(observed, last.found),
         residual_rms=last.found.spread,
         noise=noise,
         misfit='; '.join(filter(None, doubts)),
         covariance=whole.errors,
         imbalance=last.imbalance,
     )
+
+
+def _residuals(observed: Observed, found: Refined) -> FloatArray:
+    """Return what a fit leaves of either angle, NaN where nothing was simulated, (m, 2) [rad]."""
+    residuals = np.full(observed.angles.shape, np.nan)
+    for block in blocks(observed):
+        part = part_of(observed, block, float(found.parameters[DELAY]))
+        each = left_in(part, block, found)
+        for segment, left in zip(observed.segments[block], each, strict=True):
+            residuals[segment.first : segment.last] = left
+    return residuals
 
 
 def _estimates(start: PlanarArm, whole: _Whole) -> tuple[ParameterEstimate, ...]:

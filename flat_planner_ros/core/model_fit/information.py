@@ -159,7 +159,7 @@ def misprediction(arm: PlanarArm, measurements: Measurements) -> FloatArray:
     observed = observed_of(measurements, _free_period(arm))
     model, starts, ones = vector_of(arm), first_starts(observed), np.ones(CHANNELS)
     around = linearised(observed, model, starts, (), scales_of(observed, model), ones)
-    left = np.mean(np.concatenate(around.residuals) ** 2, axis=0)
+    left = around.power / around.samples
     wrong = np.sqrt(np.maximum(left - noise_of_links(measurements) ** 2, 0.0))
     motion = observed.angles.std(axis=0)
     result: FloatArray = wrong / np.maximum(motion, np.finfo(float).tiny)

@@ -14,16 +14,11 @@
 
 """How far a fit can be believed: residuals that err alike, and what is not modelled."""
 
-from collections.abc import Sequence
-
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.base_errors import root_of
+from flat_planner_ros.core.model_fit.correlation import correlation_length
 from flat_planner_ros.core.model_fit.refinement import Linearisation
-from flat_planner_ros.core.model_fit.simulation import CHANNELS
 import numpy as np
-
-LONGEST_LAG = 0.25
-"""Longest lag of an autocorrelation, relative to the segment [-]."""
 
 FAR_PRIOR = 1e4
 """Size of a step that no data need to exclude, relative to the parameters' scales [-]."""
@@ -41,43 +36,9 @@ MODEL_FLOOR = 1e-4
 """Residual that a simulation always leaves, relative to the motion's spread [-]."""
 
 
-def correlation_length(residuals: Sequence[FloatArray]) -> float:
-    """
-    Return how many samples are worth one independent one, at least 1 [-].
-
-    Parameters
-    ----------
-    residuals
-        Of one channel in each segment, shape (samples,).
-
-    Notes
-    -----
-    The sum of the autocorrelations over its initial positive pairs (Geyer 1992).
-
-    """
-    lags = max(2, int(LONGEST_LAG * min(map(len, residuals))))
-    power = sum(float(part @ part) for part in residuals)
-    if power == 0.0:
-        return 1.0
-    correlation = np.sum([_products(part, lags) for part in residuals], axis=0)
-    pairs = (correlation[: lags // 2 * 2].reshape(-1, 2) / power).sum(axis=1)
-    negative = np.flatnonzero(pairs < 0.0)
-    count = int(negative[0]) if negative.size else pairs.size
-    return max(1.0, 2.0 * float(pairs[:count].sum()) - 1.0)
-
-
 def correlation_lengths(around: Linearisation) -> list[float]:
     """Return the correlation length of either channel's residuals [-]."""
-    parts = around.residuals
-    return [
-        correlation_length([part[:, channel].astype(float) for part in parts])
-        for channel in range(CHANNELS)
-    ]
-
-
-def _products(values: FloatArray, lags: int) -> FloatArray:
-    """Return the sums of products of values that are 0, 1, ... samples apart, shape (lags,)."""
-    return np.array([float(values[lag:] @ values[: values.size - lag]) for lag in range(lags)])
+    return [correlation_length(sums) for sums in around.products]
 
 
 def covariance(around: Linearisation, scales: FloatArray) -> FloatArray:

@@ -14,19 +14,21 @@
 
 """The fit of the last two links: a guess, its refinement, what is told, and how well."""
 
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from math import pi, sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit.doubts import (
-    Change,
-    change_between,
+    as_it_is,
+    changes_by,
     Doubt,
     errors_of,
     straighter,
     straightness,
+    View,
+    Way,
 )
 from flat_planner_ros.core.model_fit.imbalance import find_imbalance, ImbalanceEstimate
 from flat_planner_ros.core.model_fit.judgement import covariance
@@ -50,7 +52,7 @@ from flat_planner_ros.core.model_fit.observation import (
     with_fewer_efforts,
     with_other_times,
 )
-from flat_planner_ros.core.model_fit.refinement import Linearisation, linearised, refine, Refined
+from flat_planner_ros.core.model_fit.refinement import linearised, refine, Refined
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
 from flat_planner_ros.core.model_fit.simulation import first_starts, Observed, with_unknowns
 from flat_planner_ros.core.model_fit.starts import settled
@@ -148,33 +150,33 @@ def _doubts(
     scales: FloatArray,
     vague: float,
     are_held: bool,
-) -> Iterator[Doubt]:
-    """Yield what may be wrong with inputs and integration, `vague` being the straightness."""
-
-    def around(changed: Observed) -> Linearisation:
-        return linearised(changed, found.parameters, found.starts, free, scales, found.spread)
-
-    def change(changed: Observed) -> Change:
-        return change_between(plain, around(changed), found.spread)
+) -> list[Doubt]:
+    """Return what may be wrong with inputs and integration, `vague` being the straightness."""
+    # Fewer steps of a feedback tell nothing of what happens between them.
+    inputs: list[View] = [partial(with_other_times, seed=seed) for seed in range(HELD_TIMES)]
+    if not are_held:
+        inputs = [partial(with_fewer_efforts, every=every) for every in (2, 4)]
 
     # Longer steps do for differences.
-    observed = replace(observed, refinement=observed.refinement / 2)
-    plain = around(observed)
+    def longer(part: Observed) -> Observed:
+        return replace(part, refinement=part.refinement / 2)
+
+    ways = [Way(as_it_is, found.around), Way(longer)]
+    ways += [Way(partial(_both, longer, see)) for see in [straighter, *inputs]]
+    plain, *others = changes_by(ways, observed, found, free, scales)
+    straight, *others = (other.since(plain) for other in others)
     # Of second order where efforts have corners: twice the step adds three times the error.
-    yield Doubt(1 / 3, change_between(found.around, plain, found.spread))
-    straight = change(straighter(observed))
-    yield Doubt(vague, straight)
+    doubts = [Doubt(1 / 3, plain), Doubt(vague, straight)]
     if are_held:
-        # Fewer steps of a feedback tell nothing of what happens between them.
-        for seed in range(HELD_TIMES):
-            draw = change(with_other_times(observed, seed))
-            yield Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER)
-        return
-    half, quarter = (
-        change(with_fewer_efforts(observed, every)).besides(straight) for every in (2, 4)
-    )
+        return doubts + [Doubt(1.0 / sqrt(HELD_TIMES), draw, COVER) for draw in others]
+    half, quarter = (other.besides(straight) for other in others)
     weight = 1.0 / (quarter.growth_from(half) - 1.0)
-    yield Doubt(weight, half, 1 / 3 / weight)
+    return [*doubts, Doubt(weight, half, 1 / 3 / weight)]
+
+
+def _both(first: View, then: View, part: Observed) -> Observed:
+    """Return a recording that is seen in two other ways at once."""
+    return then(first(part))
 
 
 def _guesses(

@@ -15,7 +15,6 @@
 """A recording of the last two links as the fit sees it, and the size of what it looks for."""
 
 from dataclasses import replace
-from itertools import pairwise
 from math import sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
@@ -176,9 +175,12 @@ def with_other_times(observed: Observed, seed: int) -> Observed:
         Of the times, each as likely as any other between its two samples.
 
     """
-    earlier = np.random.default_rng(seed).uniform(-0.5, 0.5, observed.effort.size - 1)
-    for before, after in pairwise(observed.segments):
-        earlier[before.last - 1 : after.first] = 0.0
+    bits = np.random.PCG64(seed).advance(observed.before)
+    earlier = np.random.Generator(bits).uniform(-0.5, 0.5, observed.effort.size - 1)
+    is_inside = np.zeros(earlier.size, dtype=bool)
+    for first, last in observed.segments:
+        is_inside[first : last - 1] = True
+    earlier[~is_inside] = 0.0
     # Half of the impulse that is gained or lost goes to either end: what interpolates keeps it.
     gained = 0.5 * earlier * np.diff(observed.effort)
     return replace(observed, effort=observed.effort + np.append(gained, 0) + np.append(0, gained))

@@ -26,6 +26,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.model_fit.correlation import lags_for, products
 from flat_planner_ros.core.model_fit.last_links import (
     BOTH,
     LAST,
@@ -39,6 +40,7 @@ from flat_planner_ros.core.model_fit.simulation import (
     first_starts,
     Observed,
     seen_with_slopes,
+    SingleOrDouble,
 )
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +69,9 @@ MOST_DAMPING = 1e8
 NULL = 1e-10
 """Curvature below which a direction is not told at all, relative to the largest [-]."""
 
+KEPT = 50_000
+"""Samples up to which residuals are kept; those of longer recordings are found again: 0.4 MB."""
+
 NEIGHBOURS = 1 / 6
 """Distance up to which residuals may err alike, relative to a segment [-]: a free period."""
 
@@ -87,9 +92,15 @@ class Linearisation(NamedTuple):
         Sums of products of neighbouring scores, with the kernel of Bartlett, shape (free, free).
     rounding
         The same for the rounding of encoders, which err alike as long as they stand still.
+    samples
+        Of all segments.
+    products
+        Sums of products of what is left of either channel 0, 1, ... samples apart in a segment,
+        not weighted, shape (2, lags) [rad^2].
     residuals
-        What is left of either channel in each segment, not weighted, (samples, 2) [rad]. Single
-        precision does: rounding is 1e-7 of what is itself an error.
+        What is left of either channel in each segment, not weighted, (samples, 2) [rad]; empty if
+        there are more than `KEPT` samples. Single precision does: rounding is 1e-7 of what is
+        itself an error.
     corrections
         For each segment the step of its own unknowns without a step of the parameters (own,), and
         the change of that with them (own, free).
@@ -101,8 +112,15 @@ class Linearisation(NamedTuple):
     normal: FloatArray
     scatter: FloatArray
     rounding: FloatArray
-    residuals: list[npt.NDArray[np.float32]]
+    samples: int
+    products: FloatArray
+    residuals: Sequence[SingleOrDouble]
     corrections: list[tuple[FloatArray, FloatArray]]
+
+    @property
+    def power(self) -> FloatArray:
+        """Return the sum of squares of either channel, shape (2,) [rad^2]."""
+        return self.products[:, 0]
 
 
 class Refined(NamedTuple):
@@ -121,6 +139,8 @@ def linearised(
     free: Sequence[int],
     scales: FloatArray,
     spread: FloatArray,
+    *,
+    keeps: bool = False,
 ) -> Linearisation:
     """
     Return misfit and sensitivities.
@@ -140,13 +160,17 @@ def linearised(
         Sizes of the parameters, for difference quotients, shape (8,).
     spread
         By which the residuals of either channel are divided, shape (2,) [rad].
+    keeps
+        Whether to keep what is left however long the recording is.
 
     """
     count = len(free)
     cost, gradient = 0.0, np.zeros((CHANNELS, count))
     normal = np.zeros((CHANNELS, count, count))
     scatter, rounding = np.zeros((count, count)), np.zeros((count, count))
-    residuals, corrections = [], []
+    lags = lags_for(segment.last - segment.first for segment in observed.segments)
+    samples = sum(segment.last - segment.first for segment in observed.segments)
+    sums, residuals, corrections = np.zeros((CHANNELS, lags)), [], []
     pieces = _segments(observed, model, starts, free, scales)
     for segment, start, piece in zip(observed.segments, starts, pieces, strict=True):
         whole, whole_columns, correction = _projected(*piece, start[STATES:], spread)
@@ -167,9 +191,21 @@ def linearised(
             rounding += share**2 * _alike(own, moves)
         scores = (left[:, None] * left_columns).reshape(len(piece[0]), CHANNELS, count).sum(axis=1)
         scatter += neighbours(scores, max(1, round(NEIGHBOURS * len(scores))))
-        residuals.append((left.reshape(-1, CHANNELS) * spread).astype(np.float32))
+        each = (left.reshape(-1, CHANNELS) * spread).astype(np.float32)
+        sums += products(each.astype(float), lags)
+        if keeps or samples <= KEPT:
+            residuals.append(each)
         corrections.append(correction)
-    return Linearisation(cost, gradient, normal, scatter, rounding, residuals, corrections)
+    sensitivities = gradient, normal, scatter, rounding
+    return Linearisation(cost, *sensitivities, samples, sums, residuals, corrections)
+
+
+def left_in(part: Observed, block: slice, found: Refined) -> Sequence[SingleOrDouble]:
+    """Return what a fit leaves in each segment of a block, which is a recording of its own."""
+    if found.around.residuals:
+        return found.around.residuals[block]
+    point = found.parameters, found.starts[block], (), found.parameters, found.spread
+    return linearised(part, *point, keeps=True).residuals
 
 
 def _projected(
@@ -252,10 +288,8 @@ def refine(
             break
         else:
             damping = max(10 * damping, 1e-4)
-    samples = sum(map(len, best.residuals))
-    unknowns = STATES * len(best.residuals) + len(free)
-    power = sum((left**2).sum(axis=0, dtype=float) for left in best.residuals)
-    found = np.sqrt(power / max(samples - unknowns / CHANNELS, 1.0))
+    unknowns = STATES * len(best.corrections) + len(free)
+    found = np.sqrt(best.power / max(best.samples - unknowns / CHANNELS, 1.0))
     return Refined(point[0], point[1], found, best)
 
 
@@ -290,9 +324,8 @@ def _stepped(
 
 def _in_errors(step: FloatArray, around: Linearisation) -> float:
     """Return the length of a step in standard errors of white noise [-]."""
-    samples = CHANNELS * sum(map(len, around.residuals))
     gain = float(step @ around.normal.sum(axis=0) @ step)
-    return sqrt(gain / (around.cost / samples + 1e-300))
+    return sqrt(gain / (around.cost / (CHANNELS * around.samples) + 1e-300))
 
 
 def _segments(

@@ -89,6 +89,8 @@ class Observed:
         coupling that is small itself.
     base_errors
         What `base` may be off where friction turns; None for nothing.
+    before
+        Samples of the recording before these.
 
     """
 
@@ -104,6 +106,7 @@ class Observed:
     refinement: float = 1.0
     turning: SingleOrDouble | None = None
     base_errors: BaseErrors | None = None
+    before: int = 0
 
     @property
     def unknowns(self) -> int:

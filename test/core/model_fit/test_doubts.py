@@ -42,31 +42,41 @@ def test_how_straight_efforts_go_between_samples_is_found(rate, straightness):
     assert fit.found.parameters[:4] == pytest.approx([7e-4, 3e-5, 2.7e-3, 2.5e-5], rel=2e-3)
 
 
-def change(residuals):
-    """Return a change of residuals (m, 2) of a model whose one parameter adds 1 to all."""
-    array = np.array(residuals, dtype=float)
-    normal = np.full((2, 1, 1), float(len(array)))
-    return Change(array, array.sum(axis=0)[:, None], normal)
+def changes(*residuals):
+    """Return changes of residuals (m, 2) of a model whose one parameter adds 1 to all."""
+    arrays = np.array(residuals, dtype=float)
+    products = np.einsum('imc,jmc->cij', arrays, arrays)
+    count = arrays.shape[1]
+    normal = np.full((2, 1, 1), float(count))
+    return [
+        Change(share, products, count, array.sum(axis=0)[:, None], normal)
+        for share, array in zip(np.eye(len(arrays)), arrays, strict=True)
+    ]
 
 
 def test_what_another_change_explains_is_left_out():
-    first, second = change([[1.0, 0.0], [2.0, 1.0]]), change([[1.0, 1.0], [0.0, 0.0]])
+    residuals = np.array([[1.0, 0.0], [2.0, 1.0]]), np.array([[1.0, 1.0], [0.0, 0.0]])
+    first, second, none = changes(*residuals, np.zeros((2, 2)))
     rest = first.besides(second)
-    assert (rest.residuals * second.residuals).sum() == pytest.approx(0.0, abs=1e-15)
-    assert rest.residuals == pytest.approx(first.residuals - 0.5 * second.residuals)
-    assert rest.gradient == pytest.approx(rest.residuals.sum(axis=0)[:, None])
-    assert first.besides(change(np.zeros((2, 2)))).residuals == pytest.approx(first.residuals)
+    left = residuals[0] - 0.5 * residuals[1]
+    assert rest.along(second).sum() == pytest.approx(0.0, abs=1e-15)
+    assert rest.power == pytest.approx((left**2).sum(axis=0))
+    assert rest.on_residuals == pytest.approx((left * residuals[0]).sum(axis=0))
+    assert rest.gradient == pytest.approx(left.sum(axis=0)[:, None])
+    assert first.besides(none).power == pytest.approx(first.power)
 
 
 def test_a_step_leaves_what_no_parameter_explains():
-    wrong = change([[1.0, 0.0], [2.0, 1.0]])
+    residuals = np.array([[1.0, 0.0], [2.0, 1.0]])
+    (wrong,) = changes(residuals)
     step = wrong.step(np.array([3.0]))
-    assert step == pytest.approx([-wrong.residuals.mean()])
-    assert wrong.left(step) == pytest.approx(((wrong.residuals + step) ** 2).mean(axis=0))
+    assert step == pytest.approx([-residuals.mean()])
+    assert wrong.left(step) == pytest.approx(((residuals + step) ** 2).mean(axis=0))
 
 
 @pytest.mark.parametrize(('ratio', 'growth'), [(1.0, 4.0), (6.0, 6.0), (50.0, 8.0)])
 def test_changes_grow_with_the_spacing_by_the_second_to_third_power(ratio, growth):
-    finer = change([[1.0, 0.0], [2.0, 1.0]])
-    assert change(ratio * finer.residuals).growth_from(finer) == pytest.approx(growth)
-    assert finer.growth_from(change(np.zeros((2, 2)))) == 4.0
+    residuals = np.array([[1.0, 0.0], [2.0, 1.0]])
+    finer, coarser, none = changes(residuals, ratio * residuals, np.zeros((2, 2)))
+    assert coarser.growth_from(finer) == pytest.approx(growth)
+    assert finer.growth_from(none) == 4.0

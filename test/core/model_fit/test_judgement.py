@@ -14,6 +14,7 @@
 
 """Covariances of what is told well, and of what is told only together or not at all."""
 
+from flat_planner_ros.core.model_fit.correlation import products
 from flat_planner_ros.core.model_fit.judgement import correlation_lengths, covariance
 from flat_planner_ros.core.model_fit.refinement import Linearisation
 import numpy as np
@@ -32,7 +33,9 @@ def around(columns, rng):
         normal=np.stack((columns.T @ columns, columns.T @ columns)),
         scatter=scores.T @ scores,
         rounding=np.zeros((columns.shape[1],) * 2),
-        residuals=[left],
+        samples=SAMPLES,
+        products=products(left, SAMPLES // 4),
+        residuals=[],
         corrections=[],
     )
 
@@ -63,3 +66,11 @@ def test_of_what_is_told_the_covariance_is_that_of_weighted_least_squares(apart)
 def test_without_parameters_there_is_no_covariance():
     rng = np.random.default_rng(2)
     assert covariance(around(np.zeros((SAMPLES, 0)), rng), np.zeros(0)).shape == (0, 0)
+
+
+def test_products_of_neighbours_are_sums_over_what_overlaps():
+    values = np.random.default_rng(3).standard_normal((SAMPLES, 2))
+    found = products(values, 7)
+    for lag in range(7):
+        expected = (values[lag:] * values[: SAMPLES - lag]).sum(axis=0)
+        assert found[:, lag] == pytest.approx(expected, rel=1e-12, abs=1e-12)
