@@ -25,6 +25,7 @@ from flat_planner_ros.ros.parameters import planner as planner_parameters
 from flat_planner_ros.ros.parameters import plant as plant_parameters
 from flat_planner_ros.ros.parameters.parameter_file import read_settings
 from flat_planner_ros.ros.wire import interfaces, stamps
+from flat_planner_ros.ros.wire.point_writer import trajectory_bytes
 from measurement import Section, verdict
 import numpy as np
 import problem
@@ -54,8 +55,27 @@ SPEED_TARGETS = {2: 80.0, 4: 5.0}
 ARM_FILES = {2: None, 4: Path(__file__).parents[1] / 'config' / 'arm_4dof.yaml'}
 """Parameters of the arms; None for the nodes' own, the paper's arm."""
 
-LONG_MOTION = 60.0
-"""Duration of a motion that outlasts a measurement [s]."""
+
+class FreeMotion(NamedTuple):
+    """
+    A motion that outlasts a measurement, in simulated time.
+
+    Attributes
+    ----------
+    ahead
+        Time to its start, in which the plant is to hear of it [s].
+    duration, spacing
+        How long it lasts, and the time between its points [s].
+
+    """
+
+    ahead: float
+    duration: float
+    spacing: float
+
+
+FREE_MOTIONS = {2: FreeMotion(100.0, 3600.0, 0.6), 4: FreeMotion(10.0, 240.0, 0.06)}
+"""Motions by the number of joints."""
 
 RATE = 1000.0
 """Rate of joint states in real time [Hz]."""
@@ -118,20 +138,28 @@ def _trajectory_msg(start: float, samples: PlanSamples) -> JointTrajectory:
     return msg
 
 
-def _motion(joints: int, start: float) -> JointTrajectory:
+def _motion(joints: int) -> PlanSamples:
     """Return a long motion of an arm from where its plant starts."""
-    file = ARM_FILES[joints]
+    file, (_, duration, spacing) = ARM_FILES[joints], FREE_MOTIONS[joints]
     if file is None:
-        return trajectory(start, LONG_MOTION)
+        made = plan(problem.request(duration=duration), problem.arm(), problem.OPTIONS)
+        return made.sample(spacing)
     plant = read_settings(file, plant_parameters.ROWS, plant_parameters.build, node='flat_plant')
     planner = read_settings(
         file, planner_parameters.ROWS, planner_parameters.build, node='flat_planner'
     )
     first = np.array(plant.simulation.position)
     final = first + np.append(np.full(joints - 1, 0.5), 0.0)
-    request = MotionRequest(start=first, final=final, duration=LONG_MOTION)
+    request = MotionRequest(start=first, final=final, duration=duration)
     made = plan(request, planner.session.arm, planner.session.options)
-    return _trajectory_msg(start, made.sample(LONG_MOTION / 1000))
+    return made.sample(spacing)
+
+
+def _command(samples: PlanSamples, start: float) -> bytes:
+    """Return samples as a serialised command: message objects would take simulated minutes."""
+    tables = [samples.positions, samples.velocities, samples.accelerations, samples.efforts]
+    names = [f'joint{i + 1}' for i in range(samples.positions.shape[1])]
+    return trajectory_bytes(names, stamps.sec_and_nanosec(start), samples.times, tables)
 
 
 def _free_section() -> Section:
@@ -157,6 +185,7 @@ def _free_section() -> Section:
 def _free_run(executor: str, joints: int) -> tuple[float, Usage]:
     """Return simulated seconds per second, and the work."""
     parameters = {'publish_clock': 'true', 'real_time_factor': '0.0', 'publish_rate': '200.0'}
+    motion = _motion(joints)
     process = NodeProcess('plant', executor, parameters, ARM_FILES[joints])
     with processes(process), listener('free_listener') as ours:
         seen: list[tuple[float, float]] = []
@@ -168,8 +197,9 @@ def _free_run(executor: str, joints: int) -> tuple[float, Usage]:
         ours.spin_until(lambda: seen, 'a /clock')
         command = ours.node.create_publisher(JointTrajectory, COMMAND, 10)
         ours.spin_until(command.get_subscription_count, 'the plant')
-        command.publish(_motion(joints, seen[-1][1] + 20.0))
-        ours.spin_until(lambda: seen[-1][1] > seen[0][1] + 25.0, 'the motion')
+        start = seen[-1][1] + FREE_MOTIONS[joints].ahead
+        command.publish(_command(motion, start))
+        ours.spin_until(lambda: seen[-1][1] > start, 'the motion')
         process.look()
         first = len(seen)
         ours.spin(FREE_SECONDS)
@@ -177,6 +207,7 @@ def _free_run(executor: str, joints: int) -> tuple[float, Usage]:
         assert process.is_running(), process.log
         assert not process.warnings, process.log
         simulated, elapsed = np.subtract(seen[-1][::-1], seen[first][::-1])
+        assert seen[-1][1] < start + FREE_MOTIONS[joints].duration, 'the motion must outlast it'
         assert states, 'joint states go with /clock'
     return simulated / elapsed, usage
 
