@@ -237,6 +237,13 @@ class Soak(Rig):
         if kind == 'transport' and len(self.to_plant.delivered) < len(self.to_plant.received):
             self.counts['motions not played, command lost'] += 1
             return
+        state = self._ended(verdict)[0]['state']
+        assert state != 'FAILED', 'a motion has failed though its command came in time'
+        if 'amplitude' not in report:
+            said = self.graph.logged('amplitude unknown')
+            assert said, f'a report without amplitude, and no word why: {report}'
+            self.counts['residuals withheld, said by the monitor'] += 1
+            return
         bound = {
             'mismatch': 1.2 * float(verdict['predicted_residual_worst']) + EXACT,
             'noise': FEIGNED,

@@ -48,6 +48,13 @@ WARM_UP = 0.3
 MAX_GROWTH = 0.01
 """Largest growth of a node's resident memory after the warm-up [-]."""
 
+MIN_CHECKED = 0.5
+"""
+Smallest share of the motions reported whose residuals could be checked [-].
+
+Of the others the nodes have said why not: late, lost, or not measured.
+"""
+
 MAX_DRIFT = 0.02
 """Largest drift of the plant's clock against the time of day [s]."""
 
@@ -71,6 +78,9 @@ def run_rig(name: str, minutes: float, seed: int) -> None:
             rig.run(60.0 * minutes)
             failures = list(rig.failures)
             seconds = rig.counts['seconds']
+            checked, reported = rig.counts['residuals checked'], rig.counts['motions reported']
+            if checked < MIN_CHECKED * reported:
+                failures.append(f'only {checked} residuals checked of {reported} motions reported')
             memory = {}
             for (node, pid), samples in rig.memory.items():
                 if samples and (grown := growth(samples, seconds)) is not None:

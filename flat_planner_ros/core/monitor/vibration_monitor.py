@@ -300,8 +300,11 @@ class VibrationMonitor:
 
         """
         now += self._correction
-        if now < self._now - self.settings.timeout:
-            self._reset_by(self._now - now)
+        latest = self._last_sample if isfinite(self._last_sample) else self._now
+        if now < latest - self.settings.timeout:
+            self._reset_by(latest - now)
+        # Samples that come late after all leave the time behind what it was told to be meanwhile.
+        self._now = min(self._now, max(now, latest))
         self._advance(now)
         return self._take_reports()
 

@@ -466,6 +466,25 @@ def test_a_clock_that_jumps_back_forgets_the_motion(monitor, by_tick):
     assert only(feed(monitor, again, 1.1, 5.1)).start_time == 2.0
 
 
+@pytest.mark.parametrize(('stalled', 'levels'), [(9.7, ['warn']), (10.3, ['stale', 'warn'])])
+def test_samples_that_were_held_up_are_no_clock_that_was_set_back(monitor, stalled, levels):
+    motion, following = planned(), planned(start=13.2)
+    monitor.watch(motion)
+    reports = feed(monitor, motion, 9.5, stalled)
+    for step in (0.1, 0.3, 0.5, 0.65):
+        reports += monitor.tick(stalled + step)
+    if reports:
+        motion = following
+        monitor.watch(motion)
+    waiting = range(round(stalled / PERIOD), round((stalled + 0.65) / PERIOD))
+    for time in (i * PERIOD for i in waiting):
+        reports += monitor.add(sample(time, motion)) + monitor.tick(time)
+    reports += feed(monitor, motion, stalled + 0.65, motion.end + WINDOW + 0.1)
+    assert [report.level.value for report in reports] == levels
+    assert reports[-1].fit.amplitude == pytest.approx(0.02, rel=1e-6)
+    assert monitor.take_warnings() == []
+
+
 def test_reset_forgets_so_that_the_same_plan_starts_anew(monitor):
     motion = planned()
     monitor.watch(motion)
