@@ -217,14 +217,26 @@ def half_quadrature(rates: ComplexArray) -> tuple[FloatArray, FloatArray]:
         Normalised times x + 1 in (0, 1), and weights whose sum is 1, shape (m,) [-].
 
     """
-    depth = ceil(log2(np.abs(rates).max() + 1.0)) + 1
-    edges = _panels(depth)
-    # A term may oscillate many times within its layer: split panels that it still reaches.
-    is_alive = np.multiply.outer(edges[:-1], np.abs(rates.real)) < NEGLIGIBLE_DECAY
-    turns = np.diff(edges) * np.where(is_alive, np.abs(rates), 0.0).max(axis=1)
-    parts = 1.0 + np.floor(turns / RADIANS_PER_PANEL)
+    return _split_panels(*_division(rates, 0.0))
+
+
+def _division(rates: ComplexArray, turning: float) -> tuple[int, tuple[int, ...]]:
+    """Return the depth of panels that resolve rates, and another all along; parts of each."""
+    depth = ceil(log2(float(np.abs(rates).max(initial=turning)) + 1.0)) + 1
+    widths, alive = _speeds(rates.tobytes(), depth)
+    parts = 1.0 + np.floor(widths * np.maximum(alive, turning) / RADIANS_PER_PANEL)
     counts = np.ceil(parts * min(1.0, MAX_PANELS / parts.sum())).astype(int)
-    return _split_panels(depth, tuple(counts.tolist()))
+    return depth, tuple(counts.tolist())
+
+
+@lru_cache(maxsize=QUADRATURES_KEPT)
+def _speeds(rates: bytes, depth: int) -> tuple[FloatArray, FloatArray]:
+    """Return the widths of panels, and the fastest of some rates that is alive on each."""
+    roots, edges = np.frombuffer(rates, dtype=complex), _panels(depth)
+    # A term may oscillate many times within its layer: split panels that it still reaches.
+    is_alive = np.multiply.outer(edges[:-1], np.abs(roots.real)) < NEGLIGIBLE_DECAY
+    alive = np.where(is_alive, np.abs(roots), 0.0).max(axis=1, initial=0.0)
+    return locked(np.diff(edges)), locked(alive)
 
 
 @lru_cache(maxsize=QUADRATURES_KEPT)
@@ -259,19 +271,29 @@ def motion_quadrature(
         Times [s], and weights whose sum is 1, shape (m,).
 
     """
-    # A motion's peak velocity is about twice the mean one.
-    rates = np.append(rates, 2j * travel)
     begin = edges[0]
     duration = edges[-1] - begin
-    times: list[FloatArray] = []
-    weights: list[FloatArray] = []
+    pieces = []
     for start, end in pairwise(edges):
         share = (end - start) / duration
-        nodes, halves = half_quadrature(share * rates)
-        reach = 0.5 * (end - start) * nodes
-        times += [start + reach - begin, end - reach - begin]
-        weights += 2 * [0.5 * share * halves]
+        # A motion's peak velocity is about twice the mean one.
+        division = _division(share * rates, share * 2.0 * travel)
+        pieces.append(_piece(*division, start - begin, end - begin, share))
+    if len(pieces) == 1:
+        return pieces[0]
+    times, weights = zip(*pieces, strict=True)
     return np.concatenate(times), np.concatenate(weights)
+
+
+@lru_cache(maxsize=QUADRATURES_KEPT)
+def _piece(
+    depth: int, parts: tuple[int, ...], start: float, end: float, share: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return nodes between two times [s], and weights whose sum is their share of a motion."""
+    nodes, halves = _split_panels(depth, parts)
+    reach = 0.5 * (end - start) * nodes
+    times = np.concatenate([start + reach, end - reach])
+    return locked(times), locked(np.tile(0.5 * share * halves, 2))
 
 
 @cache

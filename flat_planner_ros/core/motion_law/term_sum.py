@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import ComplexArray, FloatArray
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.terms import series_derivatives, Term, TOP_ORDER, trimmed
 import numpy as np
 
@@ -39,6 +39,12 @@ CHUNK = 32 * BLOCK
 
 BLOCKS_KEPT = 4
 """Blocks of even grids that are remembered."""
+
+BASES_KEPT = 8
+"""Tables of exponentials and powers that are remembered: goals of one duration share them."""
+
+FEW = 16
+"""Number of times below which such a table is formed sooner than found."""
 
 
 class Mixed(NamedTuple):
@@ -258,8 +264,28 @@ def plain_sums(
         Shape (..., orders, places).
 
     """
+    terms = factors.shape[-1]
+    if powers is None and decays.ndim == 1 and FEW <= distances.shape[1] <= CHUNK:
+        basis = _kept_basis(decays.tobytes(), distances.tobytes(), terms)
+    else:
+        basis = _basis(decays, distances, terms, powers)
+    sums: FloatArray = factors @ basis
+    return sums
+
+
+@lru_cache(maxsize=BASES_KEPT)
+def _kept_basis(decays: bytes, distances: bytes, terms: int) -> FloatArray:
+    """Return a basis by the bytes of what it depends on."""
+    places = np.frombuffer(distances).reshape(2, -1)
+    return locked(_basis(np.frombuffer(decays, dtype=complex), places, terms))
+
+
+def _basis(
+    decays: ComplexArray, distances: FloatArray, terms: int, powers: FloatArray | None = None
+) -> FloatArray:
+    """Return what the factors of plain sums multiply, as `plain_sums`, (..., terms, places)."""
     count, places = decays.shape[-1], distances.shape[1]
-    basis = np.empty((*decays.shape[:-1], factors.shape[-1], places))
+    basis = np.empty((*decays.shape[:-1], terms, places))
     # Far from its end an exponential vanishes: this underflow is the right answer.
     with np.errstate(under='ignore'):
         if count:
@@ -271,8 +297,7 @@ def plain_sums(
             _fill_powers(rows, 0.5 * (distances[0] - distances[1]))
         else:
             rows[:] = powers[: len(rows)]
-        sums: FloatArray = factors @ basis
-    return sums
+    return basis
 
 
 def term_sum(terms: Sequence[Term], order: int = TOP_ORDER) -> TermSum:

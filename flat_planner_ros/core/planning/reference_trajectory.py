@@ -20,7 +20,7 @@ evaluated law by law.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Protocol
 
 from flat_planner_ros.core.arm import apply_row, ComplexArray, FloatArray, locked
@@ -32,7 +32,11 @@ import numpy as np
 NODES_PER_PIECE = 8
 """Gauss-Legendre nodes between two knots of an effort that is linear there."""
 
+GRIDS_KEPT = 2
+"""Even grids that are remembered: goals of one duration share one."""
 
+
+@lru_cache(maxsize=GRIDS_KEPT)
 def even_times(duration: float, intervals: int) -> FloatArray:
     """Return even times of a motion, both ends exact, read-only, shape (m,) [s]."""
     times = np.arange(intervals + 1.0)
