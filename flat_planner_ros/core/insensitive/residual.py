@@ -124,24 +124,26 @@ class _ResidualMap(NamedTuple):
 
     Attributes
     ----------
-    duration, step
-        From the first sample to the last, and to the next [s].
     poles
         Of the arms, shape (p,) [1/s].
     fine, coarse
         Exponentials over the samples of a block, shape (BLOCK, p), and over the blocks, (rows, p).
-    inner, first
-        Weights of a sample between others, and of the first ones of a start in motion, shape (p,).
+    whole
+        Exponential over the duration, shape (p,).
+    inner
+        Weight of a sample between others, shape (p,).
+    first
+        Of the first ones of a start in motion, by how much their weight is less, and the
+        exponential over what follows them, shape (p,) each.
 
     """
 
-    duration: float
-    step: float
     poles: ComplexArray
     fine: ComplexArray
     coarse: ComplexArray
+    whole: ComplexArray
     inner: ComplexArray
-    first: tuple[ComplexArray, ...]
+    first: tuple[tuple[ComplexArray, ComplexArray], ...]
 
     @classmethod
     def of(
@@ -153,8 +155,12 @@ class _ResidualMap(NamedTuple):
         rows = -(-samples // BLOCK)
         fine = np.exp(np.multiply.outer(np.arange(BLOCK), turn))
         coarse = np.exp(np.multiply.outer(BLOCK * np.arange(rows), turn))
-        inner, first = _weights(oscillator, turn, step)
-        return cls(duration, step, poles, fine, coarse, inner, first)
+        inner, weights = _weights(oscillator, turn, step)
+        first = [
+            (inner - weight, np.exp((duration - index * step) * poles))
+            for index, weight in enumerate(weights)
+        ]
+        return cls(poles, fine, coarse, np.exp(duration * poles), inner, tuple(first))
 
     def amplitudes(self, signal: FloatArray, start: tuple[float, float]) -> FloatArray:
         """Return amplitudes, shape (p,) [rad]; arguments as of `residual_amplitude`."""
@@ -164,12 +170,9 @@ class _ResidualMap(NamedTuple):
         angle, velocity = start
         if angle or velocity or signal[0]:
             # In motion: the first samples weigh less, and the joint brings its own oscillation.
-            poles, step = self.poles, self.step
-            free = velocity - poles.conj() * angle
-            driven += np.exp(self.duration * poles) * free
-            for index, weight in enumerate(self.first):
-                left = np.exp((self.duration - index * step) * poles)
-                driven += (self.inner - weight) * signal[index] * left
+            driven += self.whole * (velocity - self.poles.conj() * angle)
+            for (less, left), value in zip(self.first, signal, strict=False):
+                driven += less * value * left
         amplitudes: FloatArray = np.abs(driven) / self.poles.imag
         return amplitudes
 

@@ -41,15 +41,19 @@ class Delivery:
     def __init__(self) -> None:
         """Know nothing: no delay."""
         self._ages: deque[float] = deque(maxlen=AGES)
+        self._delay: float | None = 0.0
 
     def hear(self, age: float) -> None:
         """Take the age of a joint state on arrival [s]."""
         self._ages.append(age)
+        self._delay = None
 
     @property
     def delay(self) -> float:
         """Return the usual time on the way [s]."""
-        return abs(median(self._ages)) if self._ages else 0.0
+        if self._delay is None:
+            self._delay = abs(median(self._ages))
+        return self._delay
 
     @property
     def start_delay(self) -> float:

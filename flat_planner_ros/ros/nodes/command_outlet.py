@@ -22,9 +22,13 @@ from flat_planner_ros.ros.parameters.planner import PlannerSettings
 from flat_planner_ros.ros.wire import conversions, interfaces
 from flat_planner_ros.ros.wire.command_form import WHOLE
 from flat_planner_ros.ros.wire.message_types import message_class, UnknownType
+from rclpy.clock import Clock, ClockType
 
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 EFFORTS = 'std_msgs/msg/Float64MultiArray'
+
+LOOK_PERIOD = 0.1
+"""Time between two looks for those who listen to flat outputs [s]."""
 
 
 class CommandOutlet:
@@ -60,6 +64,10 @@ class CommandOutlet:
         self._command = node.create_publisher(kind, interfaces.COMMAND, interfaces.RELIABLE)
         self._plan = node.create_publisher(kind, interfaces.PLAN, interfaces.LATCHED)
         self._flat_plan = node.create_publisher(kind, interfaces.FLAT_PLAN, interfaces.LATCHED)
+        self._kept: Track | None = None
+        # Steady: those who come while a simulated clock stands still hear it, too.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(LOOK_PERIOD, self._publish_kept, clock=steady)
         self.efforts = node.create_publisher(
             message_class(EFFORTS), interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
         )
@@ -79,8 +87,16 @@ class CommandOutlet:
         self._plan.publish(plan)
 
     def publish_flat(self, track: Track) -> None:
-        """Publish the flat outputs of the same, for viewers: whatever is urgent goes first."""
-        self._flat_plan.publish(conversions.flat_plan_bytes(track))
+        """Publish the flat outputs of the same, for viewers: once there are any."""
+        self._kept = track
+        self._publish_kept()
+
+    def _publish_kept(self) -> None:
+        """Publish the flat outputs that nobody has heard, if anybody listens by now."""
+        track = self._kept
+        if track is not None and self._flat_plan.get_subscription_count() > 0:
+            self._kept = None
+            self._flat_plan.publish(conversions.flat_plan_bytes(track))
 
     def controllers(self) -> list[str]:
         """Return the full names of the nodes that carry out commands, as far as is known."""

@@ -44,6 +44,9 @@ TYPES_KEPT = 32
 LENGTH = struct.Struct('=I')
 """Number of entries of a sequence, or of characters with the zero at the end."""
 
+ENDS = tuple([bytes(1 + -length % LENGTH.size) for length in range(LENGTH.size)])
+"""What follows the characters of a string, by its length modulo 4, the zero at its end included."""
+
 STAMP = struct.Struct('=iI')
 """Seconds and nanoseconds."""
 
@@ -104,8 +107,9 @@ def header_bytes(stamp: tuple[int, int]) -> bytes:
 
 def string_bytes(text: str) -> bytes:
     """Return a string, filled up to the alignment of the length that comes next."""
-    encoded = text.encode() + bytes(1)
-    return LENGTH.pack(len(encoded)) + encoded + bytes(-len(encoded) % LENGTH.size)
+    encoded = text.encode()
+    length = len(encoded) + 1
+    return LENGTH.pack(length) + encoded + ENDS[length % LENGTH.size]
 
 
 def point_type(start: int, widths: Sequence[int], order: str = '=') -> np.dtype:
