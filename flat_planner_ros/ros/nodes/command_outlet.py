@@ -65,15 +65,16 @@ class CommandOutlet:
         self._plan = node.create_publisher(kind, interfaces.PLAN, interfaces.LATCHED)
         self._flat_plan = node.create_publisher(kind, interfaces.FLAT_PLAN, interfaces.LATCHED)
         self._kept: Track | None = None
+        self._kept_plan: bytes | None = None
         # Steady: those who come while a simulated clock stands still hear it, too.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK_PERIOD, self._publish_kept, clock=steady)
+        node.create_timer(LOOK_PERIOD, self._publish_flat, clock=steady)
         self.efforts = node.create_publisher(
             message_class(EFFORTS), interfaces.EFFORT_COMMANDS, interfaces.RELIABLE
         )
 
     def publish(self, track: Track, settings: PlannerSettings) -> None:
-        """Publish a command and a plan, the command first: its start is near."""
+        """Publish a command, whose start is near; what nobody is to carry out is a plan at once."""
         joints = settings.session.joints
         plan = conversions.command_bytes(track, joints)
         if settings.session.execute:
@@ -84,14 +85,22 @@ class CommandOutlet:
                 self._command.publish(command)
             else:
                 self._controller.send(command)
-        self._plan.publish(plan)
+        self._kept, self._kept_plan = track, plan
+        if not settings.session.execute:
+            self._publish_plan()
 
-    def publish_flat(self, track: Track) -> None:
-        """Publish the flat outputs of the same, for viewers: once there are any."""
-        self._kept = track
-        self._publish_kept()
+    def publish_plans(self) -> None:
+        """Publish the plan and the flat outputs of the same: whatever is urgent goes first."""
+        self._publish_plan()
+        self._publish_flat()
 
-    def _publish_kept(self) -> None:
+    def _publish_plan(self) -> None:
+        """Publish the plan, unless that has been done."""
+        if self._kept_plan is not None:
+            self._plan.publish(self._kept_plan)
+            self._kept_plan = None
+
+    def _publish_flat(self) -> None:
         """Publish the flat outputs that nobody has heard, if anybody listens by now."""
         track = self._kept
         if track is not None and self._flat_plan.get_subscription_count() > 0:

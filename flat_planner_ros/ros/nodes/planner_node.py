@@ -30,7 +30,6 @@ from flat_planner_ros.core.session import (
     Motion,
     PlannerSession,
     Shortfall,
-    Track,
 )
 from flat_planner_ros.ros.nodes.clock_watch import ClockWatch
 from flat_planner_ros.ros.nodes.command_outlet import CommandOutlet
@@ -191,7 +190,8 @@ class PlannerNode(GuardedNode):
 
     def _carry_out(self, message: str) -> None:
         """Send a motion to rest."""
-        self._outlet.publish_flat(self._publish_motion())
+        self._publish_motion()
+        self._outlet.publish_plans()
         self._log.info(message)
         self._report_ended()
 
@@ -225,14 +225,14 @@ class PlannerNode(GuardedNode):
 
     def _answer(self, read: Read, tell: Tell = tell_nobody) -> Status:
         """Give a goal exactly one verdict, and tell it; carry the goal out if it is accepted."""
-        goal = motion = track = None
+        goal = motion = None
         started = perf_counter()
         try:
             goal = read()
             motion = self._session.submit(goal, self._now(), self._now)
             elapsed = perf_counter() - started
             # The verdict's peaks take a while: the plant need not wait for them.
-            track = self._publish_motion()
+            self._publish_motion()
             status = diagnostics.accepted_status(
                 motion,
                 goal,
@@ -248,8 +248,7 @@ class PlannerNode(GuardedNode):
         except Exception as error:  # noqa: BLE001  A goal must be answered, whatever happens.
             status = self._internal_error(error, goal, motion)
         self._publish_status(diagnostics.with_clock(status, self._offset.sure))
-        if track is not None:
-            self._outlet.publish_flat(track)
+        self._outlet.publish_plans()
         tell(values_of(status), status.message)
         self._report_ended()
         return status
@@ -269,12 +268,11 @@ class PlannerNode(GuardedNode):
         lateness = self._session.lateness if self._settings.session.execute else ''
         return '; '.join(filter(None, (self._outlet.doubt(self._settings), lateness)))
 
-    def _publish_motion(self) -> Track:
-        """Publish all that is still to be carried out, and return it."""
+    def _publish_motion(self) -> None:
+        """Publish all that is still to be carried out."""
         track = self._session.track(self._now())
         self._sent_start = track.start
         self._outlet.publish(track, self._settings)
-        return track
 
     def _publish_status(self, status: Status) -> None:
         """Publish and log a verdict."""

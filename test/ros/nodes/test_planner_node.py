@@ -151,6 +151,18 @@ def test_plan_and_flat_plan_are_latched_and_share_their_times(planner, graph):
     assert not graph.spin_until(lambda: command, timeout=0.3)
 
 
+def test_a_flat_plan_that_nobody_has_heard_reaches_those_who_come_later(graph):
+    planner = Planner(graph, PATIENT)
+    planner.measure()
+    planner.ask(goal())
+    graph.expect(lambda: planner.plans, 'the plan')
+    for _ in range(2):  # the first one has it made, the second one hears the latched message
+        flat = graph.collect(JointTrajectory, '/flat_planner/flat_plan', interfaces.LATCHED)
+        graph.expect(lambda flat=flat: flat, 'the flat plan')
+        assert flat[0].header.stamp == planner.plans[0].header.stamp
+        assert len(flat[0].points) == len(planner.plans[0].points)
+
+
 def test_the_reference_follows_the_plan_and_the_end_is_announced(planner, graph):
     planner.ask(goal(duration=0.3))
     graph.expect(lambda: len(planner.status) > 1, 'the end of the motion')
