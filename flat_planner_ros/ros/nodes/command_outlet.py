@@ -74,7 +74,7 @@ class CommandOutlet:
         )
 
     def publish(self, track: Track, settings: PlannerSettings) -> None:
-        """Publish a command, whose start is near; what nobody is to carry out is a plan at once."""
+        """Publish a command, whose start is near; where there is none, the plan at once."""
         joints = settings.session.joints
         plan = conversions.command_bytes(track, joints)
         if settings.session.execute:

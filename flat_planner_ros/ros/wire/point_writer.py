@@ -45,7 +45,7 @@ LENGTH = struct.Struct('=I')
 """Number of entries of a sequence, or of characters with the zero at the end."""
 
 ENDS = tuple([bytes(1 + -length % LENGTH.size) for length in range(LENGTH.size)])
-"""What follows the characters of a string, by its length modulo 4, the zero at its end included."""
+"""What follows a string: the zero that its length includes, and padding; by length modulo 4."""
 
 STAMP = struct.Struct('=iI')
 """Seconds and nanoseconds."""
