@@ -39,14 +39,19 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-PERIOD = 0.0025
-"""Spacing of a command's points [s]."""
+POINTS = 201
+"""Of each command."""
 
 DURATION = 0.5
-"""Of each motion [s]: 201 points."""
+"""Of each streamed motion [s]."""
 
-PAUSE = 0.6
-"""From one goal from rest to the next [s]: the motion, and the time until it starts."""
+SINGLE, PAUSE, SINGLES = 0.2, 0.3, 100
+"""
+Of single goals: duration, from one to the next [s], and the fewest of them.
+
+The pause holds the motion and the time until it starts. Of fewer, the 99th percentile would be the
+first one, which runs code for the first time.
+"""
 
 TARGETS = (
     ('command, median,', 0, 50.0, 1e-3),
@@ -79,7 +84,7 @@ SETTLING = 1.0
 
 def sections(options: Namespace) -> Iterator[Section]:
     """Return the tables of this benchmark."""
-    yield _single_section(max(20, int(options.seconds / PAUSE)))
+    yield _single_section(max(SINGLES, int(options.seconds / PAUSE)))
     yield _stream_section(min(options.seconds, LONGEST))
 
 
@@ -91,11 +96,14 @@ class _Client:
     ----------
     ours
         Node by which it is done.
+    duration
+        Of the motions [s].
 
     """
 
-    def __init__(self, ours: Listener) -> None:
+    def __init__(self, ours: Listener, duration: float) -> None:
         self.ours = ours
+        self._duration = duration
         self.sent: list[float] = []
         self.commanded: list[float] = []
         self.judged: list[tuple[float, bytes]] = []
@@ -133,7 +141,7 @@ class _Client:
     def send(self, position: float) -> None:
         """Send a goal of joint 1 [rad]."""
         point = JointTrajectoryPoint(
-            positions=[position], time_from_start=stamps.duration_msg(DURATION)
+            positions=[position], time_from_start=stamps.duration_msg(self._duration)
         )
         goal = JointTrajectory(joint_names=['joint1'], points=[point])
         self.sent.append(perf_counter())
@@ -157,7 +165,7 @@ class _Client:
 
     def residual(self, arm: PlanarArm) -> float:
         """Return the largest amplitude of the passive joint after all motions [rad]."""
-        self.ours.spin(DURATION + SETTLING)
+        self.ours.spin(self._duration + SETTLING)
         self._states.clear()
         self.ours.node.create_subscription(
             JointState, interfaces.JOINT_STATES, self._states.append, 10, raw=True
@@ -173,12 +181,12 @@ class _Client:
 
 
 @contextmanager
-def _nodes(name: str = 'planner') -> Iterator[tuple[NodeProcess, _Client]]:
+def _nodes(name: str, duration: float) -> Iterator[tuple[NodeProcess, _Client]]:
     """Let a planner, a plant and a monitor live for a while, and a client beside them."""
-    planner = NodeProcess(name, SHIPPED, {'sampling.period': f'{PERIOD:g}'})
+    planner = NodeProcess(name, SHIPPED, {'sampling.period': f'{duration / (POINTS - 1):g}'})
     others = NodeProcess('plant', SHIPPED, {}), NodeProcess('monitor', SHIPPED, {})
     with processes(planner, *others), listener('goals_client') as ours:
-        client = _Client(ours)
+        client = _Client(ours, duration)
         # Libraries that are loaded soon after the start are loaded.
         ours.spin(2.0)
         planner.look()
@@ -188,7 +196,7 @@ def _nodes(name: str = 'planner') -> Iterator[tuple[NodeProcess, _Client]]:
 
 def _single_delays(name: str, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the times from goals that come at rest to commands and to verdicts [s]."""
-    with _nodes(name) as (planner, client):
+    with _nodes(name, SINGLE) as (planner, client):
         client.at_rate(1.0 / PAUSE, count, lambda time: 0.3 + 0.1 * sin(1e3 * time))
         assert client.accepted == count, planner.warnings[:3]
     command = client.delays(client.commanded)
@@ -209,7 +217,7 @@ def _single_section(count: int) -> Section:
             f'{verdict(value <= max(target, FLOOR * least))}, {value / least:.2f} times'
         )
     return Section(
-        f'Single goals, planner, plant and monitor at work, {round(DURATION / PERIOD) + 1} points',
+        f'Single goals, planner, plant and monitor at work, {POINTS} points',
         (f'from the goal to, {count} goals', 'median', 'p99', 'worst'),
         [
             _delay_row('the command', ours[0]),
@@ -226,7 +234,7 @@ def _stream_section(seconds: float) -> Section:
     rows, notes = [], []
     for name, rate in [*(('planner', rate) for rate in RATES), (BARE_PLANNER, max(RATES))]:
         count = round(rate * seconds)
-        with _nodes(name) as (planner, client):
+        with _nodes(name, DURATION) as (planner, client):
             client.at_rate(rate, count, lambda time: AMPLITUDE * sin(2.0 * pi * FREQUENCY * time))
             usage, accepted = planner.look(), client.accepted
             left = client.residual(problem.arm()) if name != BARE_PLANNER else None
