@@ -52,7 +52,7 @@ from flat_planner_ros.core.model_fit.observation import (
     with_fewer_efforts,
     with_other_times,
 )
-from flat_planner_ros.core.model_fit.refinement import linearised, refine, Refined
+from flat_planner_ros.core.model_fit.refinement import linearised, refine, Refined, spread_of
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
 from flat_planner_ros.core.model_fit.simulation import first_starts, Observed, with_unknowns
 from flat_planner_ros.core.model_fit.starts import settled
@@ -123,8 +123,10 @@ def fit_last_links(
     check_moves(measurements)
     believed = vector_of(start)
     noise = np.maximum(noise_of_links(measurements), 1e-9)
-    found, scales = _first(observed, _guesses(measurements, observed, period, believed), noise)
-    observed = with_base_errors(observed, measurements, period)
+    sharper = with_base_errors(observed, measurements, period)
+    guesses = _guesses(measurements, observed, period, believed)
+    found, scales = _first(observed, sharper, guesses, noise)
+    observed = sharper
     if observed.base_errors is not None:
         # Sharper than by what is left without these errors.
         found = found._replace(starts=with_unknowns(observed, found.starts), spread=noise)
@@ -197,9 +199,13 @@ def _guesses(
 
 
 def _first(
-    observed: Observed, guesses: list[FloatArray], noise: FloatArray
+    observed: Observed, sharper: Observed, guesses: list[FloatArray], noise: FloatArray
 ) -> tuple[Refined, FloatArray]:
-    """Return the fit from the first guess that leaves little, else the best; and the scales."""
+    """
+    Return the fit from the first guess that leaves little, else the best; and the scales.
+
+    What errors of the base explain, in a sharper view of the recording, is not left.
+    """
     best, best_scales = None, np.empty(0)
     coarse, every = replace(observed, refinement=COARSE), range(len(NAMES))
     for guess in guesses:
@@ -210,11 +216,20 @@ def _first(
         found = refine(coarse, found.parameters, every, scales, noise, starts, ROUGH)
         if best is None or found.around.cost < best.around.cost:
             best, best_scales = found, scales
-        if (best.spread < LITTLE * noise).all():
+        if (best.spread < LITTLE * noise).all() or _is_explained(sharper, best, noise):
             break
     if best is None:
         raise InvalidRequest('no guess at the model has a meaning')
     return best, best_scales
+
+
+def _is_explained(sharper: Observed, found: Refined, noise: FloatArray) -> bool:
+    """Return whether noise and errors of the base are about all that is left of a fit without."""
+    if sharper.base_errors is None:
+        return False
+    starts = with_unknowns(sharper, found.starts)
+    around = linearised(sharper, found.parameters, starts, (), found.parameters, noise)
+    return bool((spread_of(around, len(NAMES)) < LITTLE * noise).all())
 
 
 def _interpolated(

@@ -57,6 +57,9 @@ CONVERGED = 5e-3
 IN_VAIN = 0.05
 """Step that, refused, is the last one, relative to them: next to nothing would be gained [-]."""
 
+NEAR = 3.0
+"""Step that, refused, may fail for the segments' own unknowns alone, relative to them [-]."""
+
 SMALLEST = 1e-7
 """Last step that is always small enough, relative to the scales [-]."""
 
@@ -266,7 +269,9 @@ def refine(
     Return the parameters with the least sum of squares (Levenberg and Marquardt).
 
     Parameters are as for `linearised`; without starts those measured are taken. The last step is
-    at most `converged` standard errors of white noise.
+    at most `converged` standard errors of white noise. Damping shortens the step of the parameters
+    alone: where a short step is refused, and that of the segments' own unknowns by itself, too,
+    none between the two is better.
     """
     point = parameters.copy(), first_starts(observed) if starts is None else starts
     best = linearised(observed, *point, free, scales, spread)
@@ -277,20 +282,47 @@ def refine(
         is_small = length < converged or float(np.abs(step / scales[list(free)]).max()) < SMALLEST
         if is_small or damping > MOST_DAMPING:
             break
-        trial = _stepped(point, best, step, free)
-        # A model that a bad step makes unstable leaves all bounds, and is refused by its cost.
-        with np.errstate(over='ignore', invalid='ignore'):
-            there = linearised(observed, *trial, free, scales, spread)
-        is_better = there.cost <= best.cost * (1.0 + 1e-12)
-        if is_better:
+        trial, there = _tried(observed, point, best, step, free, scales, spread)
+        if _is_better(there, best):
             point, best, damping = trial, there, damping / 10 if damping > 1e-6 else 0.0
-        elif length < IN_VAIN:
+            continue
+        if length < IN_VAIN:
             break
-        else:
-            damping = max(10 * damping, 1e-4)
-    unknowns = STATES * len(best.corrections) + len(free)
-    found = np.sqrt(best.power / max(best.samples - unknowns / CHANNELS, 1.0))
-    return Refined(point[0], point[1], found, best)
+        damping = max(10 * damping, 1e-4)
+        if length < NEAR:
+            trial, there = _tried(observed, point, best, 0.0 * step, free, scales, spread)
+            if not _is_better(there, best):
+                break
+            point, best = trial, there
+    return Refined(*point, spread_of(best, len(free)), best)
+
+
+def spread_of(around: Linearisation, free: int) -> FloatArray:
+    """Return the standard deviation of what so many free parameters leave, shape (2,) [rad]."""
+    unknowns = STATES * len(around.corrections) + free
+    found: FloatArray = np.sqrt(around.power / max(around.samples - unknowns / CHANNELS, 1.0))
+    return found
+
+
+def _tried(
+    observed: Observed,
+    point: tuple[FloatArray, FloatArray],
+    around: Linearisation,
+    step: FloatArray,
+    free: Sequence[int],
+    scales: FloatArray,
+    spread: FloatArray,
+) -> tuple[tuple[FloatArray, FloatArray], Linearisation]:
+    """Return where a step leads, and the misfit there."""
+    trial = _stepped(point, around, step, free)
+    # A model that a bad step makes unstable leaves all bounds, and is refused by its cost.
+    with np.errstate(over='ignore', invalid='ignore'):
+        return trial, linearised(observed, *trial, free, scales, spread)
+
+
+def _is_better(there: Linearisation, here: Linearisation) -> bool:
+    """Return whether a misfit is no larger than another but for rounding."""
+    return there.cost <= here.cost * (1.0 + 1e-12)
 
 
 def _step(around: Linearisation, damping: float, scales: FloatArray) -> FloatArray:
