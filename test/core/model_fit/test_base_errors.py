@@ -68,6 +68,13 @@ def test_errors_go_straight_from_node_to_node():
         assert near.between(values)[:, 0] == pytest.approx(expected_of[first:])
 
 
+def test_the_last_error_counts_once():
+    errors = BaseErrors(np.array([[0.1, 0.2]]), np.eye(2)[None], 0.1)
+    grid = np.array([[0.2], [0.25], [0.3]])
+    shown = errors.near(grid).between(np.array([[1.0, 3.0]]))
+    assert shown[:, 0] == pytest.approx([3.0, 1.5, 0.0])
+
+
 def test_what_nodes_did_before_acts_through_the_state():
     errors = BaseErrors(np.array([[0.1, 0.2, 0.3]]), np.eye(3)[None], 0.1)
     near = errors.near(np.array([[0.21], [0.25], [0.29]]))
