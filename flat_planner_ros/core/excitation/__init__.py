@@ -14,13 +14,15 @@
 
 """Excitation: goals that make the least certain parameter of an arm certain, safely."""
 
-from flat_planner_ros.core.excitation.excitation import Excitation, Heard, Proposal
-from flat_planner_ros.core.excitation.settings import ExcitationSettings, Room
+from flat_planner_ros.core.excitation.excitation import Excitation
+from flat_planner_ros.core.excitation.motions import Heard, Proposal
+from flat_planner_ros.core.excitation.settings import ExcitationSettings, JointRoom, Room
 
 __all__ = [
     'Excitation',
     'ExcitationSettings',
     'Heard',
+    'JointRoom',
     'Proposal',
     'Room',
 ]

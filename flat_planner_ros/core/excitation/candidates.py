@@ -16,7 +16,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, PlanarArm
 from flat_planner_ros.core.excitation.settings import Room
@@ -51,7 +51,9 @@ class Candidate:
     peak_effort
         Of joint n-1 [N m].
     motion
-        As the best model so far has it, with the time after it.
+        Of the last two links, as the best model so far has it, with the time after it.
+    most_effort
+        What each actuated joint may be planned with at most, shape (n-1,) [N m].
 
     """
 
@@ -59,6 +61,7 @@ class Candidate:
     duration: float
     peak_effort: float
     motion: ForeseenMotion
+    most_effort: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,8 +147,19 @@ def candidates(
             motion = foresee(estimate, times, effort, REFINEMENT)
             if bounds.allow(motion, at):
                 yield Candidate(
-                    final=final, duration=duration * period, peak_effort=peak, motion=motion
+                    final=final,
+                    duration=duration * period,
+                    peak_effort=peak,
+                    motion=motion,
+                    most_effort=_last_only(here.size, bounds),
                 )
+
+
+def _last_only(joints: int, bounds: Bounds) -> FloatArray:
+    """Return the bound on the effort of joint n-1; those before it only hold against it."""
+    most = np.full(joints - 1, inf)
+    most[-1] = bounds.share * bounds.room.effort
+    return most
 
 
 def _planned(

@@ -20,13 +20,21 @@ the motions that are allowed, the one after which the largest standard error, re
 parameter's scale, is smallest. D-optimal motions would make what is certain more so.
 """
 
-from dataclasses import dataclass
 from math import inf, pi
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.excitation.candidates import Bounds, Candidate, candidates, REFINEMENT
-from flat_planner_ros.core.excitation.settings import ExcitationSettings, Room
+from flat_planner_ros.core.excitation.first_joints import FirstJoints
+from flat_planner_ros.core.excitation.motions import Heard, joined, Proposal
+from flat_planner_ros.core.excitation.settings import (
+    ExcitationSettings,
+    GROWTH,
+    PLAUSIBLE,
+    Room,
+    ROUGH,
+)
 from flat_planner_ros.core.model_fit import (
+    first_misprediction,
     fit_model,
     foresee,
     information,
@@ -38,14 +46,11 @@ from flat_planner_ros.core.model_fit import (
 from flat_planner_ros.core.planning import JointLimits, PlanningOptions
 import numpy as np
 
+DELAY = NAMES.index('delay')
+"""Place of the delay of the efforts in NAMES."""
+
 SOUGHT = 6
 """Parameters that are to become certain, of NAMES; offset and delay only have to be known with."""
-
-ROUGH = 0.3
-"""Standard error of what is believed at the start, relative to the scales [-]."""
-
-GROWTH = 2.0
-"""How much larger a motion may be than one that was as predicted [-]."""
 
 WIDE, NARROW = 0.5, 0.2
 """Margins of what is foreseen, before a motion was as predicted and after [-]."""
@@ -56,64 +61,8 @@ KEPT = 6
 STANDS = 20.0
 """Range of the angle of joint n-1, in terms of the noise, below which it has not moved [-]."""
 
-PLAUSIBLE = 5.0
-"""Largest factor between inertias or stiffness found and believed, either way [-]."""
-
 MOVED = 0.03
 """Share of the planned distance that shows in which direction the arm moved [-]."""
-
-APART = 100.0
-"""Time put between two motions in the measurements [s]: a gap that no segment spans."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Proposal:
-    """
-    The motion to carry out next.
-
-    Attributes
-    ----------
-    candidate
-        Goal, duration, and what is foreseen.
-    sought
-        The parameter that is least certain.
-    before, after
-        Standard errors of all NAMES relative to their scales: now, and as predicted for after the
-        motion, shape (8,) [-].
-    scales
-        Shape (8,).
-
-    """
-
-    candidate: Candidate
-    sought: str
-    before: FloatArray
-    after: FloatArray
-    scales: FloatArray
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Heard:
-    """
-    What a motion has told.
-
-    Attributes
-    ----------
-    misprediction
-        Of the model before it, relative to the motion: of link n-1 and of the passive joint (2,).
-    holds
-        Whether the prediction held, so that the next motion may be larger.
-    fit
-        Of all motions so far; None if there is no model that explains them.
-    reached
-        Standard errors of the fit relative to the scales, shape (8,) [-].
-
-    """
-
-    misprediction: FloatArray
-    holds: bool
-    fit: ModelFit | None
-    reached: FloatArray
 
 
 class Excitation:
@@ -122,7 +71,9 @@ class Excitation:
 
     The first motion may use a share of the effort limit and of the range. Each motion is predicted
     by the model of all before it, from the efforts that acted; only one that went as predicted
-    lets the next be larger.
+    lets the next be larger. Of arms of three and more joints the last two links come first, by
+    motions of joint n-1 alone: the rows of the others rest on its friction. Then all joints move,
+    if the room has the first ones.
 
     Parameters
     ----------
@@ -158,7 +109,12 @@ class Excitation:
         self._reached = np.full(len(NAMES), inf)
         self._scales = np.zeros(len(NAMES))
         self._parts: list[Measurements] = []
-        self._planned = 0.0
+        self._planned = self._delay = 0.0
+        self._firsts: FirstJoints | None = None
+        if room.firsts:
+            self._firsts = FirstJoints(arm, options, limits, room, self.settings)
+        self._moves_all = False
+        self._parts_of_all = 0
 
     @property
     def estimate(self) -> PlanarArm:
@@ -167,13 +123,23 @@ class Excitation:
 
     @property
     def share(self) -> float:
-        """Return the share of effort limit and range that the next motion may use [-]."""
+        """Return the share of effort limit and range that joint n-1 alone may use next [-]."""
         return self._share
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of all parameters, in the order of their standard errors."""
+        return NAMES if self._firsts is None else (*NAMES, *self._firsts.names)
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Return what no motion that was looked at would tell of the first links."""
+        return () if self._firsts is None else self._firsts.untold
 
     @property
     def measurements(self) -> Measurements:
         """Return all motions so far, with gaps between them."""
-        return _joined(self._parts)
+        return joined(self._parts)
 
     @property
     def record_time(self) -> float:
@@ -183,14 +149,18 @@ class Excitation:
     @property
     def is_certain(self) -> bool:
         """Tell whether every parameter is as certain as wanted."""
-        return bool((self._reached[:SOUGHT] <= self.settings.accuracy).all())
+        return self._are_last_certain and (self._firsts is None or self._firsts.is_certain)
 
     @property
     def is_done(self) -> bool:
         """Tell whether there is nothing more to be done: certain, and one prediction held."""
-        return (self.is_certain and self._margin == NARROW) or len(
-            self._parts
-        ) >= self.settings.most_motions
+        has_held = self._margin == NARROW and (self._firsts is None or self._firsts.has_held)
+        return (self.is_certain and has_held) or len(self._parts) >= self.settings.most_motions
+
+    @property
+    def _are_last_certain(self) -> bool:
+        """Tell whether the last two links are as certain as wanted."""
+        return bool((self._reached[:SOUGHT] <= self.settings.accuracy).all())
 
     def propose(self, here: FloatArray) -> Proposal:
         """
@@ -207,6 +177,9 @@ class Excitation:
             No motion is allowed from here.
 
         """
+        if self._firsts is not None and self._are_last_certain and self._margin == NARROW:
+            return self._with_all_joints(self._firsts, here)
+        self._moves_all = False
         bounds = Bounds(
             limits=self._limits, room=self._room, share=self._share, margin=self._margin
         )
@@ -226,13 +199,8 @@ class Excitation:
         after = [self._errors(self._known + told) for _, told, _ in found]
         best = min(range(len(found)), key=lambda index: after[index][:SOUGHT].max())
         before = self._errors(self._known)
-        self._planned = float(found[best][0].final[-2] - here[-2])
-        return Proposal(
-            candidate=found[best][0],
-            sought=NAMES[int(np.argmax(before[:SOUGHT]))],
-            before=before,
-            after=after[best],
-            scales=self._scales,
+        return self._proposal(
+            found[best][0], here, NAMES[int(np.argmax(before[:SOUGHT]))], before, after[best]
         )
 
     def hear(self, measurements: Measurements) -> Heard:
@@ -251,6 +219,8 @@ class Excitation:
             arm is not what the model says.
 
         """
+        if self._firsts is not None and self._moves_all:
+            return self._heard_all(self._firsts, measurements)
         self._check_signs(measurements)
         wrong = misprediction(self._estimate, measurements)
         holds = bool((wrong <= self.settings.agreement).all())
@@ -261,9 +231,70 @@ class Excitation:
             self._noise = np.maximum(fit.residual_rms, 1e-9)
             stds = np.array([estimate.std for estimate in fit.estimates[: len(NAMES)]])
             self._reached = stds / self._scales
+            self._delay = fit.estimates[DELAY].value
         self._known = self._known + self._told(measurements)
         self._grow(holds, wrong)
-        return Heard(misprediction=wrong, holds=holds, fit=fit, reached=self._reached)
+        return self._heard(wrong, holds, fit)
+
+    def _heard_all(self, firsts: FirstJoints, measurements: Measurements) -> Heard:
+        """Learn from a motion of all joints; the last two links are known by then."""
+        firsts.check_signs(measurements)
+        wrong = misprediction(self._estimate, measurements)
+        of_links = first_misprediction(self._estimate, measurements, self._delay)
+        self._parts.append(measurements)
+        self._parts_of_all += 1
+        last = joined(self._parts[-min(self._parts_of_all, KEPT) :])
+        self._estimate = firsts.learn(last, measurements, self._estimate, self._delay)
+        firsts.grow(np.append(of_links, wrong.max()))
+        wrong = np.append(wrong, of_links)
+        return self._heard(wrong, bool((wrong <= self.settings.agreement).all()), None)
+
+    def _heard(self, wrong: FloatArray, holds: bool, fit: ModelFit | None) -> Heard:
+        """Return what a motion has told, of all parameters."""
+        reached = self._reached
+        if self._firsts is not None:
+            reached = np.append(reached, self._firsts.reached)
+        return Heard(misprediction=wrong, holds=holds, fit=fit, reached=reached)
+
+    def _with_all_joints(self, firsts: FirstJoints, here: FloatArray) -> Proposal:
+        """Return the motion that makes the least certain of the first links most certain."""
+        chosen = firsts.choose(here, self._estimate, float(self._noise[-1]))
+        self._moves_all = True
+        last = self._errors(self._known)
+        return self._proposal(
+            chosen.candidate.candidate,
+            here,
+            firsts.names[chosen.sought],
+            np.append(last, chosen.before),
+            np.append(last, chosen.after),
+        )
+
+    def _proposal(
+        self,
+        candidate: Candidate,
+        here: FloatArray,
+        sought: str,
+        before: FloatArray,
+        after: FloatArray,
+    ) -> Proposal:
+        """Return a motion with standard errors of all parameters."""
+        self._planned = float(candidate.final[-2] - here[-2])
+        scales = self._scales
+        if self._firsts is not None:
+            scales = np.append(scales, self._firsts.scales)
+            others = self._firsts.errors
+            before, after = (
+                errors if errors.size == scales.size else np.append(errors, others)
+                for errors in (before, after)
+            )
+        return Proposal(
+            candidate=candidate,
+            sought=sought,
+            names=self.names,
+            before=before,
+            after=after,
+            scales=scales,
+        )
 
     def _check_signs(self, measurements: Measurements) -> None:
         """Refuse an arm that moves the other way, or whose efforts would move it that way."""
@@ -288,7 +319,7 @@ class Excitation:
         """Return the fit of the last motions, None if no plausible model explains them."""
         if np.ptp(self._parts[-1].positions[:, -2]) < STANDS * self.settings.noise:
             return None
-        heard = _joined(self._parts[-KEPT:])
+        heard = joined(self._parts[-KEPT:])
         try:
             # From little that is told a fit tries models that run away.
             with np.errstate(over='ignore', invalid='ignore'):
@@ -333,17 +364,3 @@ class Excitation:
         inside = known * size + np.eye(len(NAMES)) / ROUGH**2
         result: FloatArray = np.sqrt(np.diag(np.linalg.inv(inside)))
         return result
-
-
-def _joined(parts: list[Measurements]) -> Measurements:
-    """Return motions one after the other, with gaps between them."""
-    times = []
-    begin = 0.0
-    for part in parts:
-        times.append(part.times - part.times[0] + begin)
-        begin = float(times[-1][-1]) + APART
-    return Measurements(
-        times=np.concatenate(times),
-        positions=np.concatenate([part.positions for part in parts]),
-        efforts=np.concatenate([part.efforts for part in parts]),
-    )

@@ -16,9 +16,18 @@
 
 from dataclasses import dataclass
 
-from flat_planner_ros.core.arm import check_number, InvalidRequest
+from flat_planner_ros.core.arm import check_number, FloatArray, InvalidRequest
 from flat_planner_ros.core.planning import JointLimits
 import numpy as np
+
+ROUGH = 0.3
+"""Standard error of what is believed at the start, relative to the scales [-]."""
+
+GROWTH = 2.0
+"""How much larger a motion may be than one that was as predicted [-]."""
+
+PLAUSIBLE = 5.0
+"""Largest factor between inertias or stiffness found and believed, either way [-]."""
 
 HALF_RANGE = 1.5
 """How far joint n-1 may turn from where it starts, where no limit says so [rad]."""
@@ -71,9 +80,31 @@ class ExcitationSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
+class JointRoom:
+    """
+    Where one of the first joints may be, and what its motor may give.
+
+    Attributes
+    ----------
+    low, high
+        Range [rad].
+    velocity
+        Largest speed [rad/s].
+    effort
+        Largest effort [N m].
+
+    """
+
+    low: float
+    high: float
+    velocity: float
+    effort: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Room:
     """
-    Where the last two joints may be, and what the motor of joint n-1 may give.
+    Where the joints may be, and what their motors may give.
 
     Attributes
     ----------
@@ -85,6 +116,8 @@ class Room:
         Largest speeds of both [rad/s].
     effort
         Largest effort of joint n-1 [N m].
+    firsts
+        Of each of the first n-2 joints; empty where they are not moved.
 
     """
 
@@ -95,9 +128,23 @@ class Room:
     velocity: float
     passive_velocity: float
     effort: float
+    firsts: tuple[JointRoom, ...] = ()
+
+    @property
+    def efforts(self) -> FloatArray:
+        """Return the largest effort of each joint that is moved, joint n-1 last [N m]."""
+        return np.array([*(joint.effort for joint in self.firsts), self.effort])
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Return lowest and highest angle of each joint that is moved and of the passive one."""
+        firsts = ((joint.low, joint.high) for joint in self.firsts)
+        return *firsts, (self.low, self.high), (self.passive_low, self.passive_high)
 
     @classmethod
-    def within(cls, limits: JointLimits, here: float, half_range: float = HALF_RANGE) -> 'Room':
+    def within(
+        cls, limits: JointLimits, here: float | FloatArray, half_range: float = HALF_RANGE
+    ) -> 'Room':
         """
         Return the room that limits leave.
 
@@ -106,28 +153,39 @@ class Room:
         limits
             What the joints may do.
         here
-            Angle of joint n-1 at the start [rad].
+            Joint angles at the start, shape (n,), or that of joint n-1 alone, which leaves the
+            first joints where they are [rad]. They are left there, too, unless all their efforts
+            are limited.
         half_range
-            How far it may turn from there, within its limits [rad].
+            How far each joint may turn from there, within its limits [rad].
 
         Raises
         ------
         InvalidRequest
-            The effort of joint n-1 is not limited, or the joint is outside its limits.
+            The effort of joint n-1 is not limited, or a joint is outside its limits.
 
         """
+        n = limits.effort.size
+        pose = np.array(here, dtype=float)
+        last = float(pose) if pose.ndim == 0 else float(pose[-2])
         effort = float(limits.effort[-2])
         if not (np.isfinite(effort) and effort > 0.0):
             raise InvalidRequest(
                 f'joint n-1 needs a finite limits.effort above 0, got {effort:g} N m: how far '
                 'a rough model may be tried depends on it'
             )
-        low = max(here - half_range, float(limits.position_min[-2]))
-        high = min(here + half_range, float(limits.position_max[-2]))
-        if not low < here < high:
-            raise InvalidRequest(
-                f'joint n-1 is at {here:.4g} rad, not inside its limits {low:.4g} to {high:.4g} '
-                'rad: move it there first'
+        low, high = _range(limits, n - 2, last, half_range, 'joint n-1')
+        firsts: tuple[JointRoom, ...] = ()
+        if pose.ndim and (np.isfinite(limits.effort[:-2]) & (limits.effort[:-2] > 0.0)).all():
+            firsts = tuple(
+                JointRoom(
+                    low=around[0],
+                    high=around[1],
+                    velocity=float(limits.velocity[i]),
+                    effort=float(limits.effort[i]),
+                )
+                for i in range(n - 2)
+                for around in [_range(limits, i, float(pose[i]), half_range, f'joint {i + 1}')]
             )
         return cls(
             low=low,
@@ -137,4 +195,19 @@ class Room:
             velocity=float(limits.velocity[-2]),
             passive_velocity=float(limits.velocity[-1]),
             effort=effort,
+            firsts=firsts,
         )
+
+
+def _range(
+    limits: JointLimits, index: int, here: float, half_range: float, name: str
+) -> tuple[float, float]:
+    """Return lowest and highest angle of a joint [rad]."""
+    low = max(here - half_range, float(limits.position_min[index]))
+    high = min(here + half_range, float(limits.position_max[index]))
+    if not low < here < high:
+        raise InvalidRequest(
+            f'{name} is at {here:.4g} rad, not inside its limits {low:.4g} to {high:.4g} '
+            'rad: move it there first'
+        )
+    return low, high

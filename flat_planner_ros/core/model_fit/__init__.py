@@ -15,6 +15,14 @@
 """Model fit: the whole model of an arm from recorded angles and efforts."""
 
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
+from flat_planner_ros.core.model_fit.first_fit import FirstFit, fit_first_links
+from flat_planner_ros.core.model_fit.first_information import (
+    first_information,
+    first_misprediction,
+    first_motions,
+    FirstMotion,
+)
+from flat_planner_ros.core.model_fit.first_links import KINDS, parameters_of, with_first_links
 from flat_planner_ros.core.model_fit.fit import fit_model, Trust
 from flat_planner_ros.core.model_fit.information import (
     foresee,
@@ -27,15 +35,24 @@ from flat_planner_ros.core.model_fit.measurements import Measurements
 from flat_planner_ros.core.model_fit.weak_form import seen_stiffness
 
 __all__ = [
+    'FirstFit',
+    'first_information',
+    'first_misprediction',
+    'first_motions',
+    'FirstMotion',
+    'fit_first_links',
     'fit_model',
     'foresee',
     'ForeseenMotion',
     'information',
+    'KINDS',
     'Measurements',
     'misprediction',
     'ModelFit',
     'NAMES',
     'ParameterEstimate',
+    'parameters_of',
     'seen_stiffness',
     'Trust',
+    'with_first_links',
 ]

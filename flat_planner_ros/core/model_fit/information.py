@@ -57,7 +57,11 @@ class ForeseenMotion:
 
 
 def foresee(
-    arm: PlanarArm, times: FloatArray, effort: FloatArray, refinement: float = 1.0
+    arm: PlanarArm,
+    times: FloatArray,
+    effort: FloatArray,
+    refinement: float = 1.0,
+    base: FloatArray | None = None,
 ) -> ForeseenMotion:
     """
     Return the motion that an effort makes, from zero angles at rest.
@@ -72,9 +76,12 @@ def foresee(
         Of joint n-1 at these times, shape (m,) [N m].
     refinement
         By which the steps of the integration are divided [-].
+    base
+        Velocity of link n-2 at these times, shape (m,) [rad/s]; at rest if there is none.
 
     """
     model = vector_of(arm)[None]
+    moved = np.zeros(times.size) if base is None else base
     period = float(times[1] - times[0])
     longest = step_for(model[0], bool(model[0, COULOMB])) / refinement
     parts = int(np.ceil(period / longest))
@@ -83,7 +90,7 @@ def foresee(
         step=period / parts,
         effort=np.interp(grid, times, effort)[:, None, None],
         variant=np.zeros(1, dtype=np.intp),
-        base=np.zeros((grid.size, 1, 1)),
+        base=np.interp(grid, times, moved)[:, None, None],
     )
     states = trajectories(model, np.zeros((1, STATES, 1)), forcing)[::parts, 0, :, 0]
     return ForeseenMotion(times=times, states=states, effort=effort)

@@ -27,7 +27,7 @@ from typing import TextIO
 
 from flat_planner_ros.core.arm import FlatPlannerError
 from flat_planner_ros.core.excitation import Excitation, ExcitationSettings, Heard, Proposal, Room
-from flat_planner_ros.core.model_fit import fit_model, NAMES
+from flat_planner_ros.core.model_fit import fit_model
 from flat_planner_ros.core.planning import JointLimits
 from flat_planner_ros.core.session import SessionSettings
 from flat_planner_ros.programs import INTERRUPTED
@@ -49,8 +49,8 @@ import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 
-SHOWN = 6
-"""Parameters of which errors are shown: inertias, spring, damper and friction."""
+HIDDEN = ('offset', 'delay')
+"""Parameters of which errors are not shown: they only have to be known with the others."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -118,8 +118,8 @@ def _excite(
     """Carry motions out until the model is known, and say what each is for and tells."""
     exciter.wait_for_nodes()
     limits = settings.limits or JointLimits.of(settings.arm.n)
-    joint = settings.joints[-2]
-    room = Room.within(limits, float(exciter.pose()[-2]), options.range)
+    room = Room.within(limits, exciter.pose(), options.range)
+    joints = settings.joints[-2 - len(room.firsts) : -1]
     wanted = ExcitationSettings(
         accuracy=options.accuracy,
         noise=options.noise,
@@ -127,52 +127,62 @@ def _excite(
         most_motions=options.motions,
     )
     excitation = Excitation(settings.arm, settings.options, limits, room, wanted)
-    print(
-        f'{joint} from {room.low:.3g} to {room.high:.3g} rad, with at most {room.effort:.3g} N m; '
-        'Return or Ctrl-C brings the arm to rest and ends this',
-        file=summary,
-        flush=True,
-    )
+    for joint, (low, high), effort in zip(joints, room.ranges, room.efforts, strict=False):
+        print(
+            f'{joint} from {low:.3g} to {high:.3g} rad, with at most {effort:.3g} N m',
+            file=summary,
+        )
+    if len(joints) < settings.arm.n - 1:
+        print(
+            'the joints before it are not moved, and tell nothing: they need finite limits.effort',
+            file=summary,
+        )
+    print('Return or Ctrl-C brings the arm to rest and ends this', file=summary, flush=True)
     number = 0
     while not excitation.is_done:
         number += 1
         proposal = excitation.propose(exciter.pose())
-        print(f'{number}: {_announced(proposal, joint)}', file=summary, flush=True)
-        heard = excitation.hear(
-            exciter.carry_out(
-                proposal, excitation.record_time, room, excitation.share * room.effort
-            )
-        )
+        print(f'{number}: {_announced(proposal, joints)}', file=summary, flush=True)
+        heard = excitation.hear(exciter.carry_out(proposal, excitation.record_time, room))
         print(f'   {_told(heard)}', file=summary, flush=True)
         print(_errors(proposal, heard), file=summary, flush=True)
+    if excitation.untold:
+        print(f'no motion tells {", ".join(excitation.untold)}', file=summary)
     return excitation
 
 
-def _announced(proposal: Proposal, joint: str) -> str:
+def _announced(proposal: Proposal, joints: Sequence[str]) -> str:
     """Return what a motion is, and what it is for."""
     wanted = proposal.candidate
+    goals = wanted.final[-1 - len(joints) : -1].tolist()
+    places = ', '.join(
+        f'{joint} to {goal:.3f} rad' for joint, goal in zip(joints, goals, strict=True)
+    )
     return (
-        f'{joint} to {wanted.final[-2]:.3f} rad in {wanted.duration:.2f} s, up to '
-        f'{wanted.peak_effort:.3g} N m, for {proposal.sought}'
+        f'{places} in {wanted.duration:.2f} s, up to '
+        f'{wanted.peak_effort:.3g} N m of {joints[-1]}, for {proposal.sought}'
     )
 
 
 def _told(heard: Heard) -> str:
     """Return whether a motion went as predicted."""
-    link, passive = 100.0 * heard.misprediction
+    link, passive, *firsts = 100.0 * heard.misprediction
     verdict = 'the next may be larger' if heard.holds else 'the next is not larger'
+    efforts = ''.join(f', {share:.2g} % of link {i}' for i, share in enumerate(firsts, 1))
     return (
-        f'predicted to {link:.2g} % of link n-1, {passive:.2g} % of the passive joint: {verdict}'
+        f'predicted to {link:.2g} % of link n-1, {passive:.2g} % of the passive joint{efforts}: '
+        f'{verdict}'
     )
 
 
 def _errors(proposal: Proposal, heard: Heard) -> str:
     """Return standard errors: before, as predicted for after, and as reached."""
-    rows = zip(NAMES[:SHOWN], proposal.before, proposal.after, heard.reached, strict=False)
+    rows = zip(proposal.names, proposal.before, proposal.after, heard.reached, strict=True)
     return '\n'.join(
-        f'   {name:<18} ± {_share(before)} before, {_share(after)} predicted, '
+        f'   {name:<20} ± {_share(before)} before, {_share(after)} predicted, '
         f'{_share(reached)} reached'
         for name, before, after, reached in rows
+        if name.partition('[')[0] not in HIDDEN
     )
 
 
@@ -187,8 +197,8 @@ def _parser() -> ArgumentParser:
         prog='excite',
         usage='%(prog)s [-h] --params-file FILE [-o FILE] [options] [--ros-args ...]',
         description='Find the model of an arm by motions that are made for it: small ones first, '
-        'larger ones once motions go as predicted, each for what is least certain. Planner and '
-        'arm run already.',
+        'larger ones once motions go as predicted, each for what is least certain. Joint n-1 '
+        'moves first, then all joints if their efforts are limited. Planner and arm run already.',
         epilog='Another namespace: --namespace /arm1 --ros-args -r __ns:=/arm1',
     )
     add = parser.add_argument
@@ -218,7 +228,7 @@ def _parser() -> ArgumentParser:
         metavar='RAD',
         type=number_above_zero,
         default=1.5,
-        help='how far joint n-1 may turn from where it is, within its limits',
+        help='how far each joint may turn from where it is, within its limits',
     )
     add('--motions', type=int, default=ExcitationSettings.most_motions, help='most motions')
     add('--namespace', default='', metavar='NS', help='of the nodes, for the parameter file')

@@ -134,9 +134,7 @@ class Exciter(Node):
         self._await_samples(lambda: bool(self._samples))
         return self._samples[-1].positions
 
-    def carry_out(
-        self, proposal: Proposal, record_time: float, room: Room, most_effort: float
-    ) -> Measurements:
+    def carry_out(self, proposal: Proposal, record_time: float, room: Room) -> Measurements:
         """
         Return what is measured of a motion and of the time after it.
 
@@ -148,8 +146,6 @@ class Exciter(Node):
             Time after it [s].
         room
             Where the arm may be; it is stopped where it leaves that.
-        most_effort
-            What the motor of joint n-1 was to give at most [N m].
 
         Raises
         ------
@@ -160,12 +156,7 @@ class Exciter(Node):
 
         """
         verdict = self._accepted(proposal)
-        peak = float(verdict.get(f'peak_effort.{self._joints[-2]}', 'nan'))
-        if not peak <= EXCESS * most_effort:
-            raise ExcitationFailed(
-                f'the planner takes {peak:.3g} N m where at most {most_effort:.3g} N m were to '
-                'be: does it have another model than the parameter file, or does the arm swing?'
-            )
+        self._check_efforts(verdict, proposal.candidate.most_effort)
         start = float(verdict['start_time'])
         until = start + float(verdict['duration']) + record_time
 
@@ -224,13 +215,22 @@ class Exciter(Node):
         """Tell whether a motion has ended since the verdicts were cleared."""
         return any(verdict.get('state') in ENDS for verdict in self._verdicts)
 
+    def _check_efforts(self, verdict: dict[str, str], most_effort: FloatArray) -> None:
+        """Refuse a plan that takes far more than joints were to give (n-1,) [N m]."""
+        for joint, most in zip(self._joints[:-1], most_effort.tolist(), strict=True):
+            peak = float(verdict.get(f'peak_effort.{joint}', 'nan'))
+            if most < inf and not peak <= EXCESS * most:
+                raise ExcitationFailed(
+                    f'the planner takes {peak:.3g} N m of {joint} where at most {most:.3g} N m '
+                    'were to be: does it have another model than the parameter file, or does the '
+                    'arm swing?'
+                )
+
     def _check_room(self, sample: JointSample, room: Room) -> None:
         """Refuse an arm that has left its room."""
-        at, passive = sample.positions[-2:].tolist()
-        for name, value, low, high in (
-            (self._joints[-2], at, room.low, room.high),
-            (self._joints[-1], passive, room.passive_low, room.passive_high),
-        ):
+        moved = len(room.ranges)
+        places = zip(self._joints[-moved:], sample.positions[-moved:].tolist(), strict=True)
+        for (name, value), (low, high) in zip(places, room.ranges, strict=True):
             if not low <= value <= high:
                 raise ExcitationFailed(
                     f'{name} is at {value:.4g} rad, outside {low:.4g} to {high:.4g} rad: stopped'

@@ -27,6 +27,8 @@ from random_cases import cases
 
 NOISE, PERIOD = 1e-4, 0.005
 OPTIONS = PlanningOptions()
+FIRST = ('inertia', 'viscous_friction', 'coulomb_friction')
+"""What a motion in a plane tells of the first link."""
 
 
 class Bench:
@@ -38,7 +40,7 @@ class Bench:
         self.effort_sign, self.angle_sign = effort, angle
         self.here = np.zeros(true.n)
         self.seen = []
-        self.room = Room.within(limits, 0.0)
+        self.room = Room.within(limits, self.here)
         self.excitation = Excitation(
             believed, OPTIONS, limits, self.room, ExcitationSettings(**settings)
         )
@@ -131,6 +133,50 @@ def test_arms_that_are_30_percent_off_become_certain_within_their_room(seed):
     for (share, *_, heard), (larger, *_) in zip(told[:-1], told[1:], strict=True):
         assert (larger > share) == (heard.holds and share < 1.0)
     assert all(heard.misprediction.max() < 0.05 for *_, heard in told[2:])
+
+
+def three(inertia, friction, *, factor=1.0):
+    """Return an arm of three joints in a horizontal plane."""
+    return PlanarArm.reduced(
+        inertia_star=(7.2e-4 * factor, 1.3e-4),
+        stiffness=8e-3 * factor,
+        damping=8e-5,
+        link_length=[0.2],
+        link_com=[0.1],
+        link_mass=[0.3],
+        link_inertia=[inertia],
+        tip_mass=0.1,
+        viscous_friction=friction[0],
+        coulomb_friction=friction[1],
+    )
+
+
+def test_an_arm_of_three_tells_its_last_links_first_and_then_the_other():
+    rng = np.random.default_rng(2)
+    true = three(1e-3, ([6e-3, 2e-4], [2e-3, 5e-4]))
+    believed = three(3.4e-3, ([0.0, 0.0], [0.0, 0.0]), factor=1.2)
+    assert believed.inertia[0, 0] == pytest.approx(1.3 * true.inertia[0, 0], abs=1e-6)
+    limits = JointLimits.of(3, effort=np.array([0.4, 0.06, inf]))
+    bench = Bench(true, believed, limits, rng)
+    told = bench.run()
+    excitation = bench.excitation
+    assert excitation.is_certain
+    assert excitation.untold == ('static_moment[1]',)
+    found, right = excitation.estimate, [*six(true), true.inertia[0, 0]]
+    friction = found.viscous_friction[0], found.coulomb_friction[0]
+    reached = told[-1][2].reached
+    places = [*range(6), *(excitation.names.index(f'{kind}[1]') for kind in FIRST)]
+    off = np.array([*six(found), found.inertia[0, 0], *friction]) - [*right, 6e-3, 2e-3]
+    stds = (reached * told[-1][1].scales)[places]
+    assert (np.abs(off) < 3.0 * stds).all()
+    assert (reached[places] <= excitation.settings.accuracy).all()
+    firsts = [proposal.sought.endswith('[1]') for _, proposal, _ in told]
+    assert firsts == sorted(firsts)
+    for (_, proposal, heard), (positions, efforts) in zip(told, bench.seen, strict=True):
+        moves = abs(proposal.candidate.final[0] - positions[0, 0]) > 1e-9
+        assert moves == proposal.sought.endswith('[1]') == (heard.misprediction.size == 3)
+        assert (np.abs(efforts).max(axis=0) <= proposal.candidate.most_effort).all()
+        assert (np.abs(positions).max(axis=0) <= [1.5, 1.5, bench.room.passive_high]).all()
 
 
 def test_what_is_predicted_is_reached():

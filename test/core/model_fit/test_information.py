@@ -14,11 +14,15 @@
 
 """What a motion will tell: against difference quotients of an arm that SciPy integrates."""
 
+from dataclasses import replace
+
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.model_fit import (
+    first_misprediction,
     fit_model,
     foresee,
     information,
+    Measurements,
     misprediction,
     NAMES,
 )
@@ -54,6 +58,39 @@ def test_a_motion_is_foreseen_as_scipy_integrates_it():
     exact = angles([BOTH, LAST, STIFFNESS, DAMPING, VISCOUS, 0.0, *np.zeros(4)])
     # Efforts go straight from sample to sample.
     assert motion.states[:, :2] == pytest.approx(exact, abs=1e-4)
+
+
+def test_friction_acts_on_what_joint_n_1_turns_relative_to_the_base():
+    """A base that turns as link n-1 does without friction leaves it none."""
+    effort = pushes(TIMES)
+    smooth = foresee(replace(ARM, viscous_friction=np.zeros(1)), TIMES, effort)
+    carried = foresee(ARM, TIMES, effort, base=smooth.states[:, 2])
+    assert carried.states == pytest.approx(smooth.states, abs=2e-4)
+    assert np.abs(foresee(ARM, TIMES, effort).states - smooth.states).max() > 0.01
+
+
+def test_first_links_of_another_inertia_mispredict_efforts_by_as_much():
+    """Second route: the arm's own efforts of a smooth motion in a plane, without friction."""
+    arm = PlanarArm.reduced(
+        inertia_star=(7e-4, 1e-4),
+        stiffness=8e-3,
+        damping=6e-5,
+        link_length=[0.2],
+        link_com=[0.1],
+        link_mass=[0.3],
+        link_inertia=[1e-3],
+        tip_mass=0.1,
+    )
+    speeds = 4.0 * np.pi * np.array([1.0, 2.0, 2.0])
+    phases = np.outer(TIMES, speeds)
+    q, dq, ddq = np.sin(phases), speeds * np.cos(phases), -(speeds**2) * np.sin(phases)
+    efforts = arm.inverse_dynamics(q, dq, ddq)[:, :-1]
+    seen = Measurements(times=TIMES, positions=q, efforts=efforts)
+    assert first_misprediction(arm, seen, 0.0) == pytest.approx([0.0], abs=1e-3)
+    inertia = arm.inertia * np.diag([1.25, 1.0, 1.0])
+    assert first_misprediction(replace(arm, inertia=inertia), seen, 0.0) == pytest.approx(
+        [0.25], abs=0.02
+    )
 
 
 def test_the_information_is_that_of_difference_quotients():
