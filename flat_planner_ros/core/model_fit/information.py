@@ -126,15 +126,17 @@ def information(
 
     """
     period = float(motion.times[1] - motion.times[0])
+    segments = segments_of(motion.times, period, SEGMENT * _free_period(arm))
     observed = Observed(
         times=motion.times,
         angles=motion.states[:, :CHANNELS],
-        rates=motion.states[:, CHANNELS:],
+        rates=motion.states[[first for first, _ in segments], CHANNELS:],
+        rate_spread=float(motion.states[:, CHANNELS].std()),
         effort=motion.effort,
         base=np.zeros(motion.times.size),
         moves=np.ones((motion.times.size, CHANNELS), dtype=bool),
         rounding=np.zeros(CHANNELS),
-        segments=segments_of(motion.times, period, SEGMENT * _free_period(arm)),
+        segments=segments,
         straightness=1.0,
         refinement=refinement,
     )

@@ -48,12 +48,14 @@ from flat_planner_ros.core.model_fit.observation import (
     check_moves,
     noise_of_links,
     observed_of,
+    smoothed_rates,
     with_base_errors,
     with_fewer_efforts,
     with_other_times,
 )
 from flat_planner_ros.core.model_fit.refinement import linearised, refine, Refined, spread_of
 from flat_planner_ros.core.model_fit.scales import scales_of, vector_of
+from flat_planner_ros.core.model_fit.signals import Even, samples_around, Smoothed
 from flat_planner_ros.core.model_fit.simulation import first_starts, Observed, with_unknowns
 from flat_planner_ros.core.model_fit.starts import settled
 from flat_planner_ros.core.model_fit.weak_form import LinkSignals, weak_guess
@@ -186,16 +188,24 @@ def _guesses(
 ) -> list[FloatArray]:
     """Return weak form and belief, the better one first."""
     count = round(float(np.ptp(observed.times)) / measurements.period) + 1
-    grid = np.linspace(observed.times[0], observed.times[-1], count)
-    link, passive, rate, effort = (
-        np.interp(grid, observed.times, signal)
-        for signal in (*observed.angles.T, observed.rates[:, 0] - observed.base, observed.effort)
-    )
-    weak = weak_guess(LinkSignals(grid, link, passive, rate, effort), period)
+    grid = Even(float(observed.times[0]), float(observed.times[-1]), count)
+    rates = smoothed_rates(observed.times, observed.angles, period)
+    weak = weak_guess(partial(even_signals, observed, grid, rates), count, period)
     guesses = [point for point in (weak, believed) if np.isfinite(point).all()]
     scales, starts, ones = np.abs(believed) + 1e-9, first_starts(observed), np.ones(2)
     costs = [linearised(observed, p, starts, (), scales, ones).cost for p in guesses]
     return [guesses[i] for i in np.argsort(costs)]
+
+
+def even_signals(
+    observed: Observed, grid: Even, rates: Smoothed, first: int, last: int
+) -> LinkSignals:
+    """Return what was measured, at times first ... last-1 of a grid."""
+    times = grid.times(first, last)
+    near = samples_around(observed.times, times)
+    rate = rates(*near.indices(observed.times.size)[:2])[:, 0] - observed.base[near]
+    seen = *observed.angles[near].T, rate, observed.effort[near]
+    return LinkSignals(times, *(np.interp(times, observed.times[near], each) for each in seen))
 
 
 def _first(

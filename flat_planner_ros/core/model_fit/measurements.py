@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from math import comb, sqrt
 
 from flat_planner_ros.core.arm import FloatArray, InvalidRequest
-from flat_planner_ros.core.model_fit.signals import stretches
+from flat_planner_ros.core.model_fit.signals import pieces, stretches
 import numpy as np
 import numpy.typing as npt
 
@@ -30,6 +30,9 @@ DIFFERENCE_ORDER = 6
 
 WHOLE = 1e-3
 """Largest distance of a measured angle from a whole number of encoder steps [-]."""
+
+MANY_LEVELS = 4096
+"""Levels among which an encoder of 24 bits would have shown two neighbours [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,10 +103,9 @@ def noise_of(measurements: Measurements) -> FloatArray:
     gain = sqrt(comb(2 * DIFFERENCE_ORDER, DIFFERENCE_ORDER))
     power, count = np.zeros(measurements.joints), 0
     for first, last in stretches(times, measurements.period):
-        # One by one: a recording may be long.
-        for joint, column in enumerate(positions[first:last].T):
-            differences = np.diff(column, DIFFERENCE_ORDER)
-            power[joint] += differences @ differences
+        for piece in pieces(first, last, DIFFERENCE_ORDER):
+            differences = np.diff(positions[piece], DIFFERENCE_ORDER, axis=0)
+            power += (differences**2).sum(axis=0)
         count += max(last - first - DIFFERENCE_ORDER, 0)
     if not count:
         raise InvalidRequest('the measurements have no stretch without gaps')
@@ -129,18 +131,27 @@ def moves_of(angle: FloatArray, step: float) -> npt.NDArray[np.bool_]:
     """
     moves = np.ones(angle.size, dtype=bool)
     place, bound = float(angle[0]), (1.0 + WHOLE) * step
-    for index, value in enumerate(angle.tolist()):
-        moves[index] = abs(value - place) > bound
-        if moves[index]:
-            place = value
+    for piece in pieces(0, angle.size):
+        for index, value in enumerate(angle[piece].tolist(), piece.start):
+            moves[index] = abs(value - place) > bound
+            if moves[index]:
+                place = value
     return moves
 
 
 def encoder_step(angle: FloatArray) -> float:
     """Return the step of the encoder of which all angles are multiples, 0 if there is none."""
-    levels = np.unique(angle)
-    if levels.size in (1, angle.size):
-        return 0.0
+    levels = np.empty(0)
+    for piece in pieces(0, angle.size):
+        levels = np.unique(np.append(levels, angle[piece]))
+        # What is no encoder has as many levels as samples.
+        if levels.size > MANY_LEVELS and not _even_step(levels):
+            return 0.0
+    return 0.0 if levels.size in (1, angle.size) else _even_step(levels)
+
+
+def _even_step(levels: FloatArray) -> float:
+    """Return the step of which all differences of ascending levels are multiples, 0 for none."""
     differences = np.diff(levels)
     step = float(differences.min())
     steps = differences / step

@@ -14,6 +14,7 @@
 
 """A recording of the last two links as the fit sees it, and the size of what it looks for."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import sqrt
 
@@ -30,8 +31,11 @@ from flat_planner_ros.core.model_fit.signals import (
     derivative,
     FEWEST,
     interpolated,
+    pieces,
     segments_of,
+    Smoothed,
     span_for,
+    spread_of,
 )
 from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
@@ -72,8 +76,7 @@ def observed_of(
             'measurements: only its swings tell a model'
         )
     times, shown = measurements.times, _shown(measurements)
-    span = max(SMOOTHING * period, FEWEST * measurements.period)
-    rates = derivative(times, shown, span, 1)
+    rates = smoothed_rates(times, shown, period)
     base = base_rate(measurements, base_smoothing(measurements, period))
     cuts = sudden_changes(measurements.efforts[:, -1]) if measurements.are_held else []
     segments = segments_of(times, measurements.period, SEGMENT * period, cuts)
@@ -84,13 +87,14 @@ def observed_of(
     return Observed(
         times=times,
         angles=shown,
-        rates=rates.astype(np.float32),
+        rates=np.concatenate([rates(first, first + 1) for first, _ in segments]),
+        rate_spread=float(spread_of(_turning_rates(rates, base))[0]),
         effort=measurements.efforts[:, -1],
         base=base,
         moves=np.column_stack([moves_of(*pair) for pair in zip(shown.T, steps, strict=True)]),
         rounding=steps / sqrt(12.0),
         segments=segments,
-        turning=_turning(times, shown, rates, span) if with_turning else None,
+        turning=_turning(times, shown, period) if with_turning else None,
     )
 
 
@@ -102,7 +106,11 @@ def check_moves(measurements: Measurements) -> None:
             f'joint {joint} stands exactly still in all {count} measurements: only its own '
             'motions tell the last two links; let it move, or check that its angle is recorded'
         )
-    moved = float(np.ptp(measurements.positions[:, :-1].sum(axis=1)))
+    ends = [
+        (link.min(), link.max())
+        for link in (measurements.positions[piece, :-1].sum(axis=1) for piece in pieces(0, count))
+    ]
+    moved = float(np.ptp(ends))
     noise = float(noise_of_links(measurements)[0])
     if moved < STANDS * noise:
         raise InvalidRequest(
@@ -119,13 +127,30 @@ def _shown(measurements: Measurements) -> FloatArray:
     return np.column_stack((link, measurements.positions[:, -1]))
 
 
-def _turning(
-    times: FloatArray, shown: FloatArray, rates: FloatArray, span: float
-) -> npt.NDArray[np.float32]:
-    """Return `Observed.turning`, of angles and velocities as they are shown (m, 2)."""
-    accelerations = derivative(times, shown, span, 2)
-    both = (np.cumsum(each, axis=1) for each in (rates, accelerations))
-    return turning_of(shown[:, 1], *both).astype(np.float32)
+def smoothed_rates(times: FloatArray, shown: FloatArray, period: float) -> Smoothed:
+    """Return the velocities of both angles (m, 2); the period is the passive joint's [s]."""
+    return Smoothed(times, shown, _span(times, period), 1)
+
+
+def _span(times: FloatArray, period: float) -> float:
+    """Return the span of the polynomials that smooth velocities [s]."""
+    return max(SMOOTHING * period, FEWEST * float(np.median(np.diff(times))))
+
+
+def _turning_rates(rates: Smoothed, base: FloatArray) -> Iterator[FloatArray]:
+    """Yield the velocity of joint n-1, a few samples at a time, shape (k, 1) [rad/s]."""
+    for piece in pieces(0, base.size):
+        yield rates(piece.start, piece.stop)[:, :1] - base[piece, None]
+
+
+def _turning(times: FloatArray, shown: FloatArray, period: float) -> npt.NDArray[np.float32]:
+    """Return `Observed.turning`, of angles as they are shown (m, 2)."""
+    found = np.empty(shown.shape, dtype=np.float32)
+    each = [Smoothed(times, shown, _span(times, period), order) for order in (1, 2)]
+    for piece in pieces(0, times.size):
+        rates, accelerations = (of(piece.start, piece.stop).cumsum(axis=1) for of in each)
+        found[piece] = turning_of(shown[piece, 1], rates, accelerations)
+    return found
 
 
 def base_rate(measurements: Measurements, smoothing: Smoothing) -> FloatArray:
@@ -149,7 +174,8 @@ def with_base_errors(observed: Observed, measurements: Measurements, period: flo
     own = base_smoothing(measurements, period)
     longer = own._replace(span=LONGER * own.span)
     change = base_rate(measurements, longer) - observed.base
-    turning = observed.rates[:, 0] - observed.base
+    rates = smoothed_rates(observed.times, observed.angles, period)
+    turning = np.concatenate(list(_turning_rates(rates, observed.base)))[:, 0]
     smoothing = own, longer
     errors = base_errors_of(observed.times, turning, change, observed.segments, smoothing)
     return replace(observed, base_errors=errors)

@@ -52,7 +52,7 @@ def part_of(observed: Observed, block: slice, delay: float) -> Observed:
         observed,
         times=times[inside],
         angles=observed.angles[inside],
-        rates=observed.rates[inside],
+        rates=observed.rates[block],
         effort=observed.effort[inside],
         base=observed.base[inside],
         moves=observed.moves[inside],

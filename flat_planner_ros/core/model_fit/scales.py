@@ -48,7 +48,7 @@ def vector_of(arm: PlanarArm) -> FloatArray:
 def scales_of(observed: Observed, guess: FloatArray) -> FloatArray:
     """Return how far each parameter may reasonably be off, shape (8,)."""
     effort = float(np.std(observed.effort)) + 1e-12
-    rate = float(np.std(observed.rates[:, 0] - observed.base)) + 1e-9
+    rate = observed.rate_spread + 1e-9
     scales = np.abs(guess)
     critical = 2 * sqrt(guess[STIFFNESS] * guess[LAST])
     scales[DAMPING] = max(scales[DAMPING], LIGHT_DAMPING * critical)

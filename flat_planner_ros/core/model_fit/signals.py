@@ -14,7 +14,7 @@
 
 """Signals between their samples, smoothed derivatives, and pieces of a recording."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import sqrt
 from typing import NamedTuple
@@ -33,6 +33,9 @@ RATE_NOISE = 3e-3
 
 FEWEST = 6
 """Fewest samples that polynomials span."""
+
+AT_A_TIME = 8192
+"""Samples that are looked at together: memory does not grow with a recording [-]."""
 
 SHORTEST = 12
 """Fewest samples of a segment: its start alone takes four unknowns [-]."""
@@ -189,18 +192,99 @@ def derivative(
         Of the polynomials.
 
     """
-    period = float(np.median(np.diff(times)))
-    count = max(round(float(times[-1] - times[0]) / period), 2 * degree) + 1
-    grid = np.linspace(times[0], times[-1], count)
-    window = min(max(2 * round(width / period / 2) + 1, degree + 3 - degree % 2), count)
-    window -= 1 - window % 2
-    spacing = float(grid[1] - grid[0])
-    weights = _smoothing(window, degree, spacing, order)
-    found = np.empty_like(angles)
-    # One by one: a recording may be long.
-    for place, column in enumerate(angles.T):
-        smooth = _smoothed(np.interp(grid, times, column), *weights)
-        found[:, place] = np.interp(times, grid, smooth)
+    return Smoothed(times, angles, width, order, degree)(0, times.size)
+
+
+class Even(NamedTuple):
+    """So many even times from one to another [s]."""
+
+    begin: float
+    end: float
+    samples: int
+
+    @property
+    def spacing(self) -> float:
+        """Return the time between two of them [s]."""
+        return (self.end - self.begin) / (self.samples - 1)
+
+    def times(self, first: int, last: int) -> FloatArray:
+        """Return those with numbers first ... last-1 [s]."""
+        found = np.arange(first, last, dtype=float) * self.spacing + self.begin
+        if last == self.samples:
+            found[-1] = self.end
+        return found
+
+    def around(self, begin: float, end: float) -> Segment:
+        """Return the numbers of times that span some [s], with one to spare on either side."""
+        first, last = (int((time - self.begin) / self.spacing) for time in (begin, end))
+        return Segment(max(first - 1, 0), min(last + 3, self.samples))
+
+
+class Smoothed:
+    """
+    A derivative of smoothed angles, for some of the samples at a time.
+
+    Parameters are as for `derivative`.
+    """
+
+    def __init__(
+        self, times: FloatArray, angles: FloatArray, width: float, order: int, degree: int = 4
+    ) -> None:
+        self._times, self._angles = times, angles
+        period = float(np.median(np.diff(times)))
+        count = max(round(float(times[-1] - times[0]) / period), 2 * degree) + 1
+        self._grid = Even(float(times[0]), float(times[-1]), count)
+        window = min(max(2 * round(width / period / 2) + 1, degree + 3 - degree % 2), count)
+        window -= 1 - window % 2
+        spacing = float(np.diff(self._grid.times(0, 2))[0])
+        self._weights = _smoothing(window, degree, spacing, order)
+
+    def __call__(self, first: int, last: int) -> FloatArray:
+        """Return the derivative at samples first ... last-1, shape (last - first, n)."""
+        times = self._times[first:last]
+        begin, end = self._needed(float(times[0]), float(times[-1]))
+        grid = self._grid.times(begin, end)
+        near = samples_around(self._times, grid)
+        has_ends = begin == 0, end == self._grid.samples
+        half = self._weights[1].size // 2
+        seen = grid[0 if has_ends[0] else half : None if has_ends[1] else grid.size - half]
+        found = np.empty((times.size, self._angles.shape[1]))
+        # One by one: a recording may be long.
+        for place, column in enumerate(self._angles[near].T):
+            even = np.interp(grid, self._times[near], column)
+            found[:, place] = np.interp(times, seen, _smoothed(even, *self._weights, *has_ends))
+        return found
+
+    def _needed(self, begin: float, end: float) -> Segment:
+        """Return the numbers of even samples that times between two are told by."""
+        window = self._weights[1].size
+        first, last = self._grid.around(begin, end)
+        first = max(min(first - window // 2, self._grid.samples - window), 0)
+        last = min(max(last + window // 2, first + window), self._grid.samples)
+        return Segment(first, last)
+
+
+def samples_around(times: FloatArray, grid: FloatArray) -> slice:
+    """Return the samples at times (m,) between which a grid lies, shape (g,) [s]."""
+    first = max(int(np.searchsorted(times, grid[0], side='right')) - 1, 0)
+    return slice(first, int(np.searchsorted(times, grid[-1])) + 1)
+
+
+def pieces(first: int, last: int, overlap: int = 0) -> Iterator[slice]:
+    """Yield the samples first ... last-1 a few at a time, some of the next ones with them."""
+    for begin in range(first, last - overlap, AT_A_TIME):
+        yield slice(begin, min(begin + AT_A_TIME + overlap, last))
+
+
+def spread_of(parts: Iterable[FloatArray]) -> FloatArray:
+    """Return the standard deviation over all rows of parts, shape of a row."""
+    count, total, power = 0, 0.0, 0.0
+    for part in parts:
+        count += len(part)
+        total = total + part.sum(axis=0)
+        power = power + (part**2).sum(axis=0)
+    mean = np.asarray(total) / count
+    found: FloatArray = np.sqrt(np.maximum(np.asarray(power) / count - mean**2, 0.0))
     return found
 
 
@@ -219,15 +303,19 @@ def _smoothing(
 
 
 def _smoothed(
-    even: FloatArray, before: FloatArray, inside: FloatArray, behind: FloatArray
+    even: FloatArray,
+    before: FloatArray,
+    inside: FloatArray,
+    behind: FloatArray,
+    has_begin: bool,
+    has_end: bool,
 ) -> FloatArray:
-    """Return a derivative of even samples (m,) by the weights of a window."""
+    """Return a derivative of even samples by the weights of a window, half of one off no end."""
     window = inside.size
+    parts = [np.correlate(even, inside, mode='valid')]
     # At both ends the polynomial of the last whole window goes on.
-    return np.concatenate(
-        (
-            before @ even[:window],
-            np.correlate(even, inside, mode='valid'),
-            behind @ even[-window:],
-        )
-    )
+    if has_begin:
+        parts.insert(0, before @ even[:window])
+    if has_end:
+        parts.append(behind @ even[-window:])
+    return np.concatenate(parts)

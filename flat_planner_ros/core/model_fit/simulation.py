@@ -67,8 +67,9 @@ class Observed:
     angles
         Of link n-1 and of the passive joint, shape (m, 2) [rad].
     rates
-        Their smoothed velocities, shape (m, 2) [rad/s], for the first guess of the starts: single
-        precision does.
+        Their smoothed velocities at the starts of the segments, shape (segments, 2) [rad/s].
+    rate_spread
+        Standard deviation of the velocity of joint n-1 [rad/s].
     effort
         Of joint n-1, shape (m,) [N m].
     base
@@ -96,7 +97,8 @@ class Observed:
 
     times: FloatArray
     angles: FloatArray
-    rates: SingleOrDouble
+    rates: FloatArray
+    rate_spread: float
     effort: FloatArray
     base: FloatArray
     moves: npt.NDArray[np.bool_]
@@ -117,7 +119,7 @@ class Observed:
 def first_starts(observed: Observed) -> FloatArray:
     """Return measured states at the starts of the segments, no error, (segments, unknowns)."""
     first = [segment.first for segment in observed.segments]
-    measured = np.hstack((observed.angles[first], observed.rates[first].astype(float)))
+    measured = np.hstack((observed.angles[first], observed.rates))
     return with_unknowns(observed, measured)
 
 

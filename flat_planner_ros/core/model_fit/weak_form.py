@@ -19,6 +19,7 @@ The rows are multiplied by smooth windows and integrated by parts, so that no no
 differentiated: the derivatives fall on the windows (weak form, Shinbrot 1957).
 """
 
+from collections.abc import Callable, Iterator
 from math import inf
 from typing import NamedTuple
 
@@ -34,6 +35,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     STIFFNESS,
     VISCOUS,
 )
+from flat_planner_ros.core.model_fit.signals import Segment
 import numpy as np
 
 WINDOW = 0.4
@@ -45,13 +47,18 @@ OVERLAP = 8
 LARGEST_DELAY = 0.05
 """Longest delay that is tried [s]."""
 
+AT_A_TIME = 1024
+"""Windows whose signals are held together [-]."""
+
+_LINK, _ABSOLUTE, _RATE, _SHARE, _PASSIVE, _PASSIVE_RATE, _ONE, _EFFORT = range(8)
+
 POWER = 4
 """A window is (1 - x^2)^POWER: it and three derivatives vanish at its ends."""
 
 
 class LinkSignals(NamedTuple):
     """
-    What is measured of the last two links.
+    What is measured of the last two links, or a piece of it.
 
     Attributes
     ----------
@@ -110,32 +117,43 @@ class Windows:
         # A copy: what is between need not stay.
         return np.correlate(signal, weights, mode='valid')[:: self._stride].copy()
 
+    def pieces(self, count: int) -> Iterator[Segment]:
+        """Yield pieces of so many samples whose windows, one after the other, are those of all."""
+        for first in range(0, max(count - self.samples, 0) + 1, AT_A_TIME * self._stride):
+            last = first + (AT_A_TIME - 1) * self._stride + self.samples
+            yield Segment(first, min(last, count))
+
     def gain(self, order: int) -> float:
         """Return the spread of such a mean for white noise of a standard deviation of one."""
         return float(np.linalg.norm(self._windows[order]))
 
 
-def weak_guess(signals: LinkSignals, period: float) -> FloatArray:
+def weak_guess(
+    signals: Callable[[int, int], LinkSignals], count: int, period: float
+) -> FloatArray:
     """
     Return parameters in the order of NAMES; those that make no sense are NaN.
 
     Parameters
     ----------
     signals
-        What was measured.
+        Gives what was measured, of even samples from a first one to before a last one.
+    count
+        How many of them there are.
     period
         Rough period of the free passive joint [s].
 
     """
-    windows = Windows(signals.times, WINDOW * period)
-    sample = float(signals.times[1] - signals.times[0])
-    shifts = range(round(LARGEST_DELAY / sample) + 1)
-    shift = min(shifts, key=lambda count: _momentum(signals, windows, count)[1])
-    (link, last, viscous, coulomb), _ = _momentum(signals, windows, shift)
+    times = signals(0, 2).times
+    windows, sample = Windows(times, WINDOW * period), float(times[1] - times[0])
+    most = round(LARGEST_DELAY / sample)
+    triangle = _triangle(signals, count, windows, most)
+    shift = min(range(most + 1), key=lambda shift: _momentum(triangle, shift)[1])
+    (link, last, viscous, coulomb), _ = _momentum(triangle, shift)
     guess = np.full(len(NAMES), np.nan)
     if min(link, last) <= 0.0:
         return guess
-    stiffness, damping, held = _spring(signals, windows, last)
+    stiffness, damping, held = _spring(triangle, last)
     if stiffness <= 0.0:
         return guess
     guess[[BOTH, LAST, STIFFNESS, DAMPING]] = link + last, last, stiffness, damping
@@ -177,31 +195,50 @@ def seen_stiffness(
     return float(stiffness / arm.stiffness), float(np.sqrt(spread) / arm.stiffness)
 
 
-def _momentum(signals: LinkSignals, windows: Windows, shift: int) -> tuple[FloatArray, float]:
+def _triangle(
+    signals: Callable[[int, int], LinkSignals], count: int, windows: Windows, most: int
+) -> FloatArray:
+    """
+    Return the triangle of the rows of all windows, in which least squares are the same (QR).
+
+    Columns are _LINK ... _ONE, and from _EFFORT on the effort 0 to `most` samples later.
+    """
+    triangle = np.empty((0, _EFFORT + most + 1))
+    for first, last in windows.pieces(count):
+        piece = signals(first, last)
+        effort = signals(max(first - most, 0), last).effort
+        held = np.full(max(most - first, 0), effort[0])
+        rows = _rows(piece, windows, np.concatenate((held, effort)))
+        triangle = np.linalg.qr(np.vstack((triangle, rows)))[1]
+    return triangle
+
+
+def _rows(signals: LinkSignals, windows: Windows, effort: FloatArray) -> FloatArray:
+    """Return the rows of a piece; its effort begins as much earlier as it may be late."""
+    count = signals.times.size
+    late = effort.size - count
+    columns = [
+        windows(signals.link, 2),
+        windows(signals.link + signals.passive, 2),
+        windows(signals.rate),
+        windows(coulomb_share(signals.rate)),
+        windows(signals.passive),
+        windows(signals.passive, 1),
+        windows(np.ones(count)),
+    ]
+    columns += [windows(effort[late - shift :][:count]) for shift in range(late + 1)]
+    return np.column_stack(columns)
+
+
+def _momentum(triangle: FloatArray, shift: int) -> tuple[FloatArray, float]:
     """Fit the sum of both rows, free of the spring: effort changes the momentum of both links."""
-    effort = np.concatenate((np.full(shift, signals.effort[0]), signals.effort))
-    columns = np.column_stack(
-        [
-            windows(signals.link, 2),
-            windows(signals.link + signals.passive, 2),
-            windows(signals.rate),
-            windows(coulomb_share(signals.rate)),
-        ]
-    )
-    return _least_squares(columns, windows(effort[: signals.effort.size]))
+    return _least_squares(triangle[:, _LINK : _SHARE + 1], triangle[:, _EFFORT + shift])
 
 
-def _spring(signals: LinkSignals, windows: Windows, last: float) -> tuple[float, float, float]:
+def _spring(triangle: FloatArray, last: float) -> tuple[float, float, float]:
     """Fit the row of the last link: stiffness, damping, and stiffness times offset."""
-    columns = np.column_stack(
-        [
-            windows(signals.passive),
-            windows(signals.passive, 1),
-            -windows(np.ones_like(signals.passive)),
-        ]
-    )
-    absolute = signals.link + signals.passive
-    (stiffness, damping, held), _ = _least_squares(columns, -last * windows(absolute, 2))
+    columns = triangle[:, _PASSIVE : _ONE + 1] * (1.0, 1.0, -1.0)
+    (stiffness, damping, held), _ = _least_squares(columns, -last * triangle[:, _ABSOLUTE])
     return float(stiffness), float(damping), float(held)
 
 

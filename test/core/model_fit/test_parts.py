@@ -15,6 +15,7 @@
 """A recording in parts, one block of segments each, tells the same as the whole of it."""
 
 from functools import partial
+import tracemalloc
 
 from flat_planner_ros.core.model_fit.base_errors import BaseErrors
 from flat_planner_ros.core.model_fit.doubts import changes_by, straighter, Way
@@ -32,23 +33,24 @@ SPREAD = np.array([1e-2, 2e-2])
 SEGMENTS, SAMPLES = 45, 60
 
 
-def swinging(*, has_errors=False):
-    """Return a recording of three blocks of segments with a gap in the second."""
-    count = SEGMENTS * SAMPLES
+def swinging(*, has_errors=False, segments=SEGMENTS):
+    """Return a recording of so many segments with a gap in the second block."""
+    count = segments * SAMPLES
     times = 0.01 * np.arange(count) + np.where(np.arange(count) >= 30 * SAMPLES, 5.0, 0.0)
     angles = np.column_stack((np.sin(times), np.sin(11.0 * times)))
-    segments = [Segment(SAMPLES * i, SAMPLES * (i + 1)) for i in range(SEGMENTS)]
-    nodes = np.array([times[each.first + 20] + 0.03 * np.arange(2) for each in segments])
-    roots = np.tile(0.1 * np.eye(2), (SEGMENTS, 1, 1))
+    cut = [Segment(SAMPLES * i, SAMPLES * (i + 1)) for i in range(segments)]
+    nodes = np.array([times[each.first + 20] + 0.03 * np.arange(2) for each in cut])
+    roots = np.tile(0.1 * np.eye(2), (segments, 1, 1))
     return Observed(
         times=times,
         angles=angles,
-        rates=np.zeros_like(angles),
+        rates=np.zeros((segments, 2)),
+        rate_spread=1.0,
         effort=0.01 * np.sin(2.0 * times),
         base=0.1 * np.sin(3.0 * times),
         moves=np.random.default_rng(0).random(angles.shape) < 0.5,
         rounding=np.array([1e-3, 1e-3]),
-        segments=segments,
+        segments=cut,
         refinement=0.3,
         turning=np.cos(angles),
         base_errors=BaseErrors(nodes, roots, 0.03) if has_errors else None,
@@ -57,7 +59,9 @@ def swinging(*, has_errors=False):
 
 def around_of(observed):
     """Return a fit to a recording, or what counts as one, and which parameters are free."""
-    starts = 0.1 * np.random.default_rng(1).standard_normal((SEGMENTS, observed.unknowns))
+    starts = 0.1 * np.random.default_rng(1).standard_normal(
+        (len(observed.segments), observed.unknowns)
+    )
     free = [0, 2, 5, 7]
     around = linearised(observed, MODEL, starts, free, SCALES, SPREAD)
     return Refined(MODEL, starts, SPREAD, around), free
@@ -127,3 +131,21 @@ def test_residuals_that_were_not_kept_are_found_again():
         again = left_in(part_of(observed, block, MODEL[-1]), block, forgotten)
         for one, other in zip(again, found.around.residuals[block], strict=True):
             assert one == pytest.approx(other, rel=1e-5, abs=1e-9)
+
+
+def peak_of_changes(segments):
+    """Return the most memory that changes take whose residuals were not kept [bytes]."""
+    observed = swinging(segments=segments)
+    found, free = around_of(observed)
+    found = found._replace(around=found.around._replace(residuals=[]))
+    ways = [Way(lambda part: part, found.around), Way(straighter)]
+    tracemalloc.start()
+    try:
+        changes_by(ways, observed, found, free, SCALES)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_memory_of_changes_does_not_grow_with_the_recording():
+    assert peak_of_changes(80) < 1.1 * peak_of_changes(20)

@@ -14,13 +14,20 @@
 
 """The linearisation of a long recording holds one block of it at a time."""
 
+from functools import partial
 import tracemalloc
 
 from flat_planner_ros.core.model_fit import Measurements
-from flat_planner_ros.core.model_fit.observation import observed_of
+from flat_planner_ros.core.model_fit.last_fit import even_signals
+from flat_planner_ros.core.model_fit.observation import (
+    noise_of_links,
+    observed_of,
+    smoothed_rates,
+)
 from flat_planner_ros.core.model_fit.refinement import linearised
-from flat_planner_ros.core.model_fit.signals import Segment
+from flat_planner_ros.core.model_fit.signals import Even, Segment
 from flat_planner_ros.core.model_fit.simulation import Observed
+from flat_planner_ros.core.model_fit.weak_form import weak_guess
 import numpy as np
 
 MODEL = np.array([7e-4, 3e-5, 2.7e-3, 2.5e-5, 2e-4, 5e-4, 0.0, 0.0])
@@ -34,7 +41,8 @@ def swinging(segments, period):
     return Observed(
         times=times,
         angles=angles,
-        rates=np.zeros_like(angles),
+        rates=np.zeros((segments, 2)),
+        rate_spread=1.0,
         effort=0.01 * np.sin(2.0 * times),
         base=np.zeros_like(times),
         moves=np.ones(angles.shape, dtype=bool),
@@ -62,17 +70,37 @@ def test_memory_grows_neither_with_segments_nor_with_their_length():
     assert peak_memory(20, 0.2) < 1.1 * few
 
 
-def test_what_is_kept_of_a_recording_is_less_than_half_of_it():
-    times = np.arange(40_000) * 0.005
+def noise(samples):
+    """Return a recording in which little but noise is to be seen."""
+    times = np.arange(samples) * 0.005
     positions = 1e-4 * np.random.default_rng(1).standard_normal((times.size, 2))
-    seen = Measurements(times=times, positions=positions, efforts=positions[:, :1])
-    observed_of(seen, 0.5)  # what is imported on the way counts for nothing
+    return Measurements(times=times, positions=positions, efforts=positions[:, :1])
+
+
+def traced(call, seen):
+    """Return what a call holds in the end, and the most it takes meanwhile [bytes]."""
     tracemalloc.start()
     try:
-        kept = observed_of(seen, 0.5)
-        held = tracemalloc.get_traced_memory()[0]
+        kept = call(seen)
+        assert kept is not None
+        return tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    own = sum(each.nbytes for each in (seen.times, seen.positions, seen.efforts))
-    assert kept.times.size == times.size
-    assert held < 0.5 * own
+
+
+def guessed(seen):
+    """Return what the fit makes of a recording before it simulates anything."""
+    observed = observed_of(seen, 0.5)
+    noise_of_links(seen)
+    grid = Even(float(seen.times[0]), float(seen.times[-1]), seen.times.size)
+    rates = smoothed_rates(seen.times, observed.angles, 0.5)
+    weak_guess(partial(even_signals, observed, grid, rates), seen.times.size, 0.5)
+    return observed
+
+
+def test_little_more_than_the_recording_is_kept_or_taken_before_anything_is_simulated():
+    guessed(noise(1000))  # what is imported on the way counts for nothing
+    few, many = (traced(guessed, noise(samples)) for samples in (40_000, 80_000))
+    held, most = (np.array(many) - few) / 40_000
+    assert held < 4.0  # Of 32 bytes that a sample has itself.
+    assert most < 24.0

@@ -35,7 +35,8 @@ def observed_arm():
     return Observed(
         times=times,
         angles=np.zeros((times.size, 2)),
-        rates=np.zeros((times.size, 2)),
+        rates=np.zeros((2, 2)),
+        rate_spread=1.0,
         effort=3e-3 * np.sin(9.0 * times),
         base=0.3 * np.cos(4.0 * times),
         moves=np.ones((times.size, 2), dtype=bool),
