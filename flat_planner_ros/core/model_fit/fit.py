@@ -39,7 +39,7 @@ from flat_planner_ros.core.model_fit.observation import noise_of_links
 from flat_planner_ros.core.model_fit.parts import part_of
 from flat_planner_ros.core.model_fit.refinement import left_in, Refined
 from flat_planner_ros.core.model_fit.scales import vector_of
-from flat_planner_ros.core.model_fit.signals import pieces, spread_of
+from flat_planner_ros.core.model_fit.signals import deviation_of, pieces
 from flat_planner_ros.core.model_fit.simulation import blocks, Observed
 from flat_planner_ros.core.model_fit.table import entries, Entry
 import numpy as np
@@ -164,7 +164,7 @@ def _result(
     observed, around = last.observed, last.found.around
     noise = noise_of_links(measurements)
     explained = np.hypot(noise, last.by_inputs)
-    motion = spread_of(observed.angles[piece] for piece in pieces(0, measurements.times.size))
+    motion = deviation_of(observed.angles[piece] for piece in pieces(0, measurements.times.size))
     doubts = [doubt(around, last.found.spread, explained, motion)]
     if first is not None:
         doubts.append(first.misfit)

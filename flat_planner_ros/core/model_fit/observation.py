@@ -29,13 +29,13 @@ from flat_planner_ros.core.model_fit.measurements import (
 )
 from flat_planner_ros.core.model_fit.signals import (
     derivative,
+    deviation_of,
     FEWEST,
     interpolated,
     pieces,
     segments_of,
     Smoothed,
     span_for,
-    spread_of,
 )
 from flat_planner_ros.core.model_fit.simulation import Observed
 import numpy as np
@@ -88,7 +88,7 @@ def observed_of(
         times=times,
         angles=shown,
         rates=np.concatenate([rates(first, first + 1) for first, _ in segments]),
-        rate_spread=float(spread_of(_turning_rates(rates, base))[0]),
+        rate_spread=float(deviation_of(_turning_rates(rates, base))[0]),
         effort=measurements.efforts[:, -1],
         base=base,
         moves=np.column_stack([moves_of(*pair) for pair in zip(shown.T, steps, strict=True)]),

@@ -276,7 +276,7 @@ def pieces(first: int, last: int, overlap: int = 0) -> Iterator[slice]:
         yield slice(begin, min(begin + AT_A_TIME + overlap, last))
 
 
-def spread_of(parts: Iterable[FloatArray]) -> FloatArray:
+def deviation_of(parts: Iterable[FloatArray]) -> FloatArray:
     """Return the standard deviation over all rows of parts, shape of a row."""
     count, total, power = 0, 0.0, 0.0
     for part in parts:

@@ -18,9 +18,9 @@ from flat_planner_ros.core.model_fit.measurements import encoder_step, moves_of
 from flat_planner_ros.core.model_fit.signals import (
     AT_A_TIME,
     derivative,
+    deviation_of,
     pieces,
     Smoothed,
-    spread_of,
 )
 import numpy as np
 import pytest
@@ -59,9 +59,9 @@ def test_pieces_overlap_as_asked_and_leave_nothing_out():
         assert before.stop == after.start + 6
 
 
-def test_a_spread_of_parts_is_that_of_all():
+def test_a_deviation_of_parts_is_that_of_all():
     values = 3.0 + RNG.standard_normal((1000, 2))
-    assert spread_of(np.array_split(values, 7)) == pytest.approx(values.std(axis=0), rel=1e-12)
+    assert deviation_of(np.array_split(values, 7)) == pytest.approx(values.std(axis=0), rel=1e-12)
 
 
 @pytest.mark.parametrize('bits', [12, 17])
