@@ -18,7 +18,7 @@ from enum import Enum
 from math import inf, pi
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, InvalidRequest, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, InvalidModel, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit.estimate import ModelFit, ParameterEstimate
 from flat_planner_ros.core.model_fit.first_fit import FirstFit, fit_first_links
 from flat_planner_ros.core.model_fit.first_links import parameters_of, with_first_links
@@ -100,13 +100,22 @@ def fit_model(
     if measurements.joints != start.n:
         raise InvalidRequest(f'{measurements.joints} joints measured, the arm has {start.n}')
     last = fit_last_links(measurements, start, with_imbalance=with_imbalance)
-    first = None
-    if start.n > 2:
-        period = 2 * pi / start.natural_mode().frequency
-        found = last.found.parameters
-        friction = float(found[VISCOUS]), float(found[COULOMB])
-        first = fit_first_links(measurements, start, period, friction, float(found[DELAY]))
+    first = None if start.n == 2 else _first_links(measurements, start, last.found.parameters)
     return _result(measurements, start, _whole(start, last, first, trust), last, first)
+
+
+def _first_links(measurements: Measurements, start: PlanarArm, found: FloatArray) -> FirstFit:
+    """Return the fit of the first links, given the last ones; nothing told if it is no arm."""
+    period = 2 * pi / start.natural_mode().frequency
+    friction = float(found[VISCOUS]), float(found[COULOMB])
+    first = fit_first_links(measurements, start, period, friction, float(found[DELAY]))
+    try:
+        with_first_links(_with_last_links(start, found), first.values)
+    except InvalidModel as error:
+        believed = parameters_of(start)
+        misfit = f'what was found of the first links is no arm, they stay as they were: {error}'
+        return FirstFit(believed, [], np.zeros_like(first.errors), misfit)
+    return first
 
 
 class _Whole(NamedTuple):
@@ -223,13 +232,18 @@ def _remark(entry: Entry, value: float, std: float) -> str:
 
 
 def _arm(start: PlanarArm, values: FloatArray) -> PlanarArm:
-    """Return the arm with the values found; none of friction and damping is negative."""
+    """Return the arm with the values found."""
+    arm = _with_last_links(start, values)
+    return arm if start.n == 2 else with_first_links(arm, values[len(NAMES) : -1])
+
+
+def _with_last_links(start: PlanarArm, values: FloatArray) -> PlanarArm:
+    """Return the arm with other last links; none of friction and damping is negative."""
     damping, viscous, coulomb = np.maximum(values[[DAMPING, VISCOUS, COULOMB]], 0.0).tolist()
-    arm = start.with_last_links(
+    return start.with_last_links(
         inertia_star=(float(values[BOTH]), float(values[LAST])),
         stiffness=float(values[STIFFNESS]),
         damping=damping,
         viscous=viscous,
         coulomb=coulomb,
     )
-    return arm if start.n == 2 else with_first_links(arm, values[len(NAMES) : -1])

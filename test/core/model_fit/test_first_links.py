@@ -223,6 +223,18 @@ def test_friction_that_noise_hides_is_not_told():
     check_told(found, ['inertia[1]', 'inertia[5]', 'static_moment[1]'], 0.05)
 
 
+def test_first_links_that_are_no_arm_stay_as_believed():
+    """Each inertia is found within its errors, and yet they do not belong together."""
+    believed, true = arms(2, 0.0, seed=102)
+    goals = tuple(np.random.default_rng(103).uniform(-1.5, 1.5, 4))
+    fit = fit_model(recorded(true, believed, noise=1e-3, goals=goals, seed=102), believed)
+    assert 'no arm' in fit.misfit and 'positive definite' in fit.misfit
+    assert fit.arm.inertia[0, 0] == believed.inertia[0, 0]
+    told = [estimate.name for estimate in fit.estimates if estimate.is_told]
+    assert 'stiffness' in told
+    assert not {'inertia[1]', 'inertia[2]', 'static_moment[2]'} & set(told)
+
+
 def test_no_friction_is_told_as_none():
     believed, true = arms(1, EARTH, seed=2)
     smooth = replace(true, viscous_friction=np.zeros(2), coulomb_friction=np.zeros(2))
