@@ -17,12 +17,13 @@
 from math import sqrt
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, PlanarArm
 from flat_planner_ros.core.model_fit.correlation import correlation_length, lags_for, products
 from flat_planner_ros.core.model_fit.first_links import (
     Chain,
     ChainSignals,
     COULOMB,
+    first_scales,
     KINDS,
     MOMENT,
     OFFSET,
@@ -34,8 +35,7 @@ from flat_planner_ros.core.model_fit.first_links import (
 from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
 from flat_planner_ros.core.model_fit.observation import LONGER
 from flat_planner_ros.core.model_fit.refinement import neighbours
-from flat_planner_ros.core.model_fit.scales import FRICTION_SHARE, OFFSET_SCALE
-from flat_planner_ros.core.model_fit.signals import derivative, span_for, stretches
+from flat_planner_ros.core.model_fit.signals import span_for, stretches
 from flat_planner_ros.core.model_fit.weak_form import OVERLAP, Windows
 import numpy as np
 
@@ -48,14 +48,8 @@ POWER = 6
 SMOOTHING = 0.15
 """Longest span of the polynomials that smooth velocities, in free periods [-]."""
 
-RESTING = 3.0
-"""Velocity below which friction may be anything, in those of Coulomb friction [-]."""
-
 MOSTLY = 0.3
 """Share of a window at rest from which it tells nothing of that joint [-]."""
-
-MOMENT_SHARE = 0.3
-"""Scale of a static moment, relative to sqrt(carried mass * inertia) [-]."""
 
 TOLD = 0.3
 """Largest standard error of a parameter that counts as told, relative to its scale [-]."""
@@ -153,7 +147,7 @@ def fit_first_links(
     chain = Chain.of(start, last_friction)
     parts = _signals(measurements, period, delay)
     believed = parameters_of(start)
-    scales = _scales(parts, start, believed)
+    scales = _scales(parts, start)
     free = list(range(believed.size))
     linear = [i for i in free if i // (start.n - 2) != OFFSET]
     values, _ = _solved(parts, chain, believed, linear, scales)
@@ -221,39 +215,20 @@ def _signals(
         windows = Windows(grid, length, POWER)
         absolute = np.cumsum(measurements.positions[first:last], axis=1)[:, :-1]
         angles = np.column_stack([np.interp(grid, times, column) for column in absolute.T])
-        rates = derivative(grid, angles, span, 1)
-        joints = np.diff(rates, axis=1, prepend=0.0)
         known, efforts = times[::every], measurements.efforts[first:last:every].T
-        signals = ChainSignals(
-            times=grid,
-            angles=angles[:, :-1],
-            rates=rates[:, :-1],
-            last_rate=joints[:, -1],
-            efforts=np.column_stack([np.interp(grid - delay, known, each) for each in efforts]),
-            resting=(np.abs(joints) < RESTING * COULOMB_VELOCITY).astype(float),
-        )
-        found.append((signals, windows))
+        acting = np.column_stack([np.interp(grid - delay, known, each) for each in efforts])
+        found.append((ChainSignals.of(grid, angles, acting, span), windows))
     return found
 
 
-def _scales(
-    parts: list[tuple[ChainSignals, Windows]], start: PlanarArm, believed: FloatArray
-) -> FloatArray:
+def _scales(parts: list[tuple[ChainSignals, Windows]], start: PlanarArm) -> FloatArray:
     """Return how far each parameter may reasonably be off, shape (5 m,)."""
-    count = start.n - 2
-    scales = np.abs(believed).reshape(len(KINDS), count)
-    effort = np.full(count, 1e-12)
-    rate = np.full(count, 1e-9)
+    effort, rate = np.zeros(start.n - 2), np.zeros(start.n - 2)
     for signals, _ in parts:
         joints = np.diff(signals.rates, axis=1, prepend=0.0)
         effort = np.maximum(effort, signals.efforts[:, :-1].std(axis=0))
         rate = np.maximum(rate, joints.std(axis=0))
-    least = MOMENT_SHARE * np.sqrt(start.carried_mass[:count] * scales[OWN])
-    scales[MOMENT] = np.maximum(scales[MOMENT], least)
-    scales[VISCOUS] = np.maximum(scales[VISCOUS], FRICTION_SHARE * effort / rate)
-    scales[COULOMB] = np.maximum(scales[COULOMB], FRICTION_SHARE * effort)
-    scales[OFFSET] = OFFSET_SCALE
-    return scales.ravel()
+    return first_scales(start, effort, rate)
 
 
 def _rows_around(

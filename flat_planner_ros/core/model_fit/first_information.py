@@ -17,12 +17,10 @@
 from math import pi
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, PlanarArm
 from flat_planner_ros.core.model_fit.first_fit import (
-    MOMENT_SHARE,
     MOSTLY,
     POWER,
-    RESTING,
     SHORTEST,
     SMOOTHING,
     WINDOW,
@@ -30,18 +28,14 @@ from flat_planner_ros.core.model_fit.first_fit import (
 from flat_planner_ros.core.model_fit.first_links import (
     Chain,
     ChainSignals,
-    COULOMB,
+    first_scales,
     KINDS,
-    MOMENT,
     OFFSET,
-    OWN,
     parameters_of,
     rows,
-    VISCOUS,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
-from flat_planner_ros.core.model_fit.scales import FRICTION_SHARE, OFFSET_SCALE
-from flat_planner_ros.core.model_fit.signals import derivative, span_for, stretches
+from flat_planner_ros.core.model_fit.signals import span_for, stretches
 from flat_planner_ros.core.model_fit.weak_form import OVERLAP, Windows
 import numpy as np
 
@@ -211,16 +205,8 @@ def _signals(motion: FirstMotion, noise: float, period: float) -> ChainSignals:
     """Return what the rows need."""
     sample = float(motion.times[1] - motion.times[0])
     angles = np.cumsum(motion.positions, axis=1)[:, :-1]
-    rates = derivative(motion.times, angles, span_for(noise, sample, SMOOTHING * period), 1)
-    joints = np.diff(rates, axis=1, prepend=0.0)
-    return ChainSignals(
-        times=motion.times,
-        angles=angles[:, :-1],
-        rates=rates[:, :-1],
-        last_rate=joints[:, -1],
-        efforts=motion.efforts,
-        resting=(np.abs(joints) < RESTING * COULOMB_VELOCITY).astype(float),
-    )
+    span = span_for(noise, sample, SMOOTHING * period)
+    return ChainSignals.of(motion.times, angles, motion.efforts, span)
 
 
 def _without_offsets(values: FloatArray) -> FloatArray:
@@ -242,12 +228,4 @@ def _scales(arm: PlanarArm, motion: FirstMotion) -> FloatArray:
     """Return how far each parameter may reasonably be off, shape (5 k,), as a fit has it."""
     count = arm.n - 2
     rates = np.gradient(motion.positions[:, :count], motion.times, axis=0)
-    effort = np.maximum(motion.efforts[:, :count].std(axis=0), 1e-12)
-    rate = np.maximum(rates.std(axis=0), 1e-9)
-    scales = np.abs(parameters_of(arm)).reshape(len(KINDS), count)
-    least = MOMENT_SHARE * np.sqrt(arm.carried_mass[:count] * scales[OWN])
-    scales[MOMENT] = np.maximum(scales[MOMENT], least)
-    scales[VISCOUS] = np.maximum(scales[VISCOUS], FRICTION_SHARE * effort / rate)
-    scales[COULOMB] = np.maximum(scales[COULOMB], FRICTION_SHARE * effort)
-    scales[OFFSET] = OFFSET_SCALE
-    return scales.ravel()
+    return first_scales(arm, motion.efforts[:, :count].std(axis=0), rates.std(axis=0))

@@ -26,7 +26,9 @@ parts, no noise is differentiated twice.
 from dataclasses import replace
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import coulomb_share, FloatArray, PlanarArm
+from flat_planner_ros.core.arm import coulomb_share, COULOMB_VELOCITY, FloatArray, PlanarArm
+from flat_planner_ros.core.model_fit.scales import FRICTION_SHARE, OFFSET_SCALE
+from flat_planner_ros.core.model_fit.signals import derivative
 from flat_planner_ros.core.model_fit.weak_form import Windows
 import numpy as np
 
@@ -35,6 +37,11 @@ KINDS = ('inertia', 'static_moment', 'viscous_friction', 'coulomb_friction', 'of
 
 OWN, MOMENT, VISCOUS, COULOMB, OFFSET = range(len(KINDS))
 
+RESTING = 3.0
+"""Velocity below which friction may be anything, in those of Coulomb friction [-]."""
+
+MOMENT_SHARE = 0.3
+"""Scale of a static moment, relative to sqrt(carried mass * inertia) [-]."""
 
 HEAVIER = 1.0 + 1e-6
 """Carried mass relative to the least that a static moment and an inertia admit [-]."""
@@ -65,6 +72,36 @@ class ChainSignals(NamedTuple):
     last_rate: FloatArray
     efforts: FloatArray
     resting: FloatArray
+
+    @classmethod
+    def of(
+        cls, times: FloatArray, angles: FloatArray, efforts: FloatArray, span: float
+    ) -> 'ChainSignals':
+        """
+        Return them, velocities smoothed over a span.
+
+        Parameters
+        ----------
+        times
+            Shape (w,) [s].
+        angles
+            Absolute angles of the first links and of link n-1, shape (w, m+1) [rad].
+        efforts
+            Of the actuated joints when they act, shape (w, m+1) [N m].
+        span
+            Of the polynomials [s].
+
+        """
+        rates = derivative(times, angles, span, 1)
+        joints = np.diff(rates, axis=1, prepend=0.0)
+        return cls(
+            times=times,
+            angles=angles[:, :-1],
+            rates=rates[:, :-1],
+            last_rate=joints[:, -1],
+            efforts=efforts,
+            resting=(np.abs(joints) < RESTING * COULOMB_VELOCITY).astype(float),
+        )
 
 
 class Chain(NamedTuple):
@@ -98,6 +135,29 @@ def parameters_of(arm: PlanarArm) -> FloatArray:
             np.zeros(count),
         )
     )
+
+
+def first_scales(arm: PlanarArm, effort: FloatArray, rate: FloatArray) -> FloatArray:
+    """
+    Return how far each parameter may reasonably be off, shape (5 m,).
+
+    Parameters
+    ----------
+    arm
+        As believed.
+    effort, rate
+        Standard deviations of efforts and velocities of the first joints, shape (m,).
+
+    """
+    count = arm.n - 2
+    scales = np.abs(parameters_of(arm)).reshape(len(KINDS), count)
+    least = MOMENT_SHARE * np.sqrt(arm.carried_mass[:count] * scales[OWN])
+    scales[MOMENT] = np.maximum(scales[MOMENT], least)
+    effort, rate = np.maximum(effort, 1e-12), np.maximum(rate, 1e-9)
+    scales[VISCOUS] = np.maximum(scales[VISCOUS], FRICTION_SHARE * effort / rate)
+    scales[COULOMB] = np.maximum(scales[COULOMB], FRICTION_SHARE * effort)
+    scales[OFFSET] = OFFSET_SCALE
+    return scales.ravel()
 
 
 def with_first_links(arm: PlanarArm, values: FloatArray) -> PlanarArm:

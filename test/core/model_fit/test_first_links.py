@@ -228,7 +228,8 @@ def test_first_links_that_are_no_arm_stay_as_believed():
     believed, true = arms(2, 0.0, seed=102)
     goals = tuple(np.random.default_rng(103).uniform(-1.5, 1.5, 4))
     fit = fit_model(recorded(true, believed, noise=1e-3, goals=goals, seed=102), believed)
-    assert 'no arm' in fit.misfit and 'positive definite' in fit.misfit
+    assert 'no arm' in fit.misfit
+    assert 'positive definite' in fit.misfit
     assert fit.arm.inertia[0, 0] == believed.inertia[0, 0]
     told = [estimate.name for estimate in fit.estimates if estimate.is_told]
     assert 'stiffness' in told
