@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from datetime import datetime
 from pathlib import Path
+import sys
 from time import monotonic, time
 
 import numpy as np
+import pytest
 from rclpy.qos import QoSProfile
 from ros.conftest import Graph
 from ros.relay import Faults, Relay
@@ -60,6 +63,12 @@ DEADLINE = 60.0
 
 MEMORY_PERIOD = 2.0
 """Time between two looks at the memory of the nodes [s]."""
+
+
+def tell(failure: str) -> str:
+    """Show what must not happen when it happens, and return it."""
+    print(f'{datetime.now():%H:%M:%S} {failure}', file=sys.stderr)
+    return failure
 
 
 class Soak(Rig):
@@ -158,10 +167,10 @@ class Soak(Rig):
             kind = str(self.random.choice(kinds))
             try:
                 self._episode(kind)
-            except AssertionError as error:
-                self.failures.append(f'{kind}: {error}')
+            except (AssertionError, pytest.fail.Exception) as error:
+                self.failures.append(tell(f'{kind}: {error}'))
                 if len(self.failures) > 10:
-                    return
+                    break
         self.counts['seconds'] = round(monotonic() - self._born)
 
     def _episode(self, kind: str) -> None:
@@ -240,8 +249,7 @@ class Soak(Rig):
         state = self._ended(verdict)[0]['state']
         assert state != 'FAILED', 'a motion has failed though its command came in time'
         if 'amplitude' not in report:
-            said = self.graph.logged('amplitude unknown')
-            assert said, f'a report without amplitude, and no word why: {report}'
+            self._expect(lambda: self.graph.logged('amplitude unknown'), f'why in {report}')
             self.counts['residuals withheld, said by the monitor'] += 1
             return
         bound = {

@@ -23,8 +23,10 @@ import signal
 from time import monotonic
 
 import numpy as np
+import pytest
 from ros.conftest import Graph
 from ros.tracked_arm import ELDER, Tracked
+from soak.rig import tell
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
@@ -43,6 +45,9 @@ LET_GO = 0.3
 
 FROZEN = 0.5
 """Time for which a tracker is stopped [s]; its timeout is shorter."""
+
+REMEMBERED = 3.0
+"""Real time for which a tracker counts as alive after its last word [s]."""
 
 MEMORY_PERIOD = 2.0
 """Real time between two looks at the memory of the nodes [s]."""
@@ -75,6 +80,7 @@ class TrackedSoak(Tracked):
         self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
         self.offsets: list[tuple[float, float]] = []
         self.processes = {}
+        self.trackers = []
         self._born, self._looked = monotonic(), 0.0
         super().__init__(graph, **PLANT)
         self.processes['plant_node'] = self.plant
@@ -84,6 +90,7 @@ class TrackedSoak(Tracked):
         """Start a tracker with a limit."""
         super().start_tracker(**{**TRACKER, 'limits.effort': f'[{LIMIT}]', **given})
         self.processes['tracker_node'] = self.tracker
+        self.trackers.append(self.tracker)
         self.memory['tracker_node', self.tracker.pid] = []
 
     def run(self, seconds: float) -> None:
@@ -93,11 +100,18 @@ class TrackedSoak(Tracked):
             kind = str(self.random.choice(KINDS))
             try:
                 self._episode(kind)
-            except AssertionError as error:
-                self.failures.append(f'{kind}: {error}')
+            except (AssertionError, pytest.fail.Exception) as error:
+                self.failures.append(tell(f'{kind}: {error}'))
                 if len(self.failures) > 10:
-                    return
+                    break
+                self._start_afresh()
         self.counts['seconds'] = round(monotonic() - self._born)
+
+    def _start_afresh(self) -> None:
+        """Leave one tracker, a new one, whatever an episode that failed has left."""
+        for tracker in (*self.trackers, self.tracker):
+            tracker.kill()
+        self.start_tracker()
 
     def _episode(self, kind: str) -> None:
         """Move once, with whatever happens, and once more, as if nothing had."""
@@ -179,10 +193,10 @@ class TrackedSoak(Tracked):
         self._await_nothing()
         self.graph.call(Trigger, '/flat_plant/reset')
         self.start_tracker()
-        count = len(self.sent)
+        count, since = len(self.sent), len(self.states)
         self.pass_time(0.5)
         assert len(self.sent) == count, 'a restarted tracker sends efforts'
-        moved = np.ptp([state.position[0] for state in self.states[-100:]])
+        moved = np.ptp([state.position[0] for state in self.states[since:]])
         assert moved < 1e-3, f'the arm has moved by {moved:.4f} rad after the restart'
 
     def _freeze(self) -> None:
@@ -208,10 +222,10 @@ class TrackedSoak(Tracked):
         self.wait_until(self.end + SETTLED)
         assert not self.graph.logged('another node sends efforts')
         elder.kill()
-        self._await_nothing()
-        began = monotonic()
-        # It counts as alive for three seconds after its last word.
-        self.graph.spin_until(lambda: monotonic() > began + 4.0)
+        self.graph.expect(lambda: not self.states[-1].effort[0], 'motors that are off')
+        off = monotonic()
+        # By then the other one knows that it is alone.
+        self.graph.spin_until(lambda: monotonic() > off + REMEMBERED + 1.0)
 
     def _await_nothing(self) -> None:
         """Wait for the end of the efforts, and see that the motors are off."""
