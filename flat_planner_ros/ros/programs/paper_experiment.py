@@ -65,7 +65,10 @@ FOUND_WITHIN = 20.0
 """Real time in which nodes that have just been started find each other [s]."""
 
 REPORT_PATIENCE = 20.0
-"""Real time that a motion and its report may take [s]."""
+"""Real time that a motion and its report may take, unless simulated time is slow [s]."""
+
+SAME_START = 1e-6
+"""Difference of two starts up to which they are of one motion [s]."""
 
 NO_SWING = 1e-6
 """Half a swing that counts as the amplitude where there is no oscillation to fit [rad]."""
@@ -133,6 +136,7 @@ class Experimenter(Node):
         self._spinner = new_executor()
         self._spinner.add_node(self)
         self._lead = LEAD * max(speed, 1.0)
+        self._report_patience = REPORT_PATIENCE / min(speed, 1.0)
         self._processes = processes
         self._interrupted = interrupted
         self._states: list[JointState] = []
@@ -282,12 +286,15 @@ class Experimenter(Node):
             heard.clear()
         self._await(lambda: bool(self._states), 'no joint states')
         start = self._accepted_start()
-        if not self._spin_until(lambda: bool(self._plans and self._reports), REPORT_PATIENCE):
+        # The report of a motion that was given up may still come.
+        if not self._spin_until(
+            lambda: bool(self._plans and self._report(start)), self._report_patience
+        ):
             raise NotPlayed(f'no report of the motion at {start:.3f} s')
         played = recording(self._states, start)
         motion = conversions.planned_motion_from_trajectory(self._plans[0])
         self._check(played, motion)
-        amplitude = self._amplitude(self._reports[0].status[0], played)
+        amplitude = self._amplitude(self._report(start), played)
         planned = of_joint_1(motion.efforts)
         # Imported here: it takes half a second, in which the nodes start by themselves.
         from scipy.integrate import trapezoid
@@ -334,6 +341,13 @@ class Experimenter(Node):
         """Return the verdict on a goal, None before; what became of the last motion is none."""
         for status in (status for msg in self._verdicts for status in msg.status):
             if any(pair.value in ('ACCEPTED', 'REJECTED') for pair in status.values):
+                return status
+        return None
+
+    def _report(self, start: float) -> Any:
+        """Return the report of the motion with a start [s], None before."""
+        for status in (status for msg in self._reports for status in msg.status):
+            if abs(float(values_of(status).get('start_time', 'nan')) - start) < SAME_START:
                 return status
         return None
 
