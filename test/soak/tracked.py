@@ -218,9 +218,11 @@ class TrackedSoak(Tracked):
         self.start_tracker()
         self.wait_until(self.end + 0.5)
         self.move_until_rivals_meet(0.0, 0.5, 0.0, 0.5)
-        assert len(self.graph.logged(ELDER)) == 1
+        said = self.graph.logged(ELDER)
+        assert len(said) == 1, said
         self.wait_until(self.end + SETTLED)
-        assert not self.graph.logged('another node sends efforts')
+        said = self.graph.logged('another node sends efforts')
+        assert not said, said
         elder.kill()
         self.graph.expect(lambda: not self.states[-1].effort[0], 'motors that are off')
         off = monotonic()

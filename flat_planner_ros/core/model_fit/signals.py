@@ -278,13 +278,13 @@ def pieces(first: int, last: int, overlap: int = 0) -> Iterator[slice]:
 
 def deviation_of(parts: Iterable[FloatArray]) -> FloatArray:
     """Return the standard deviation over all rows of parts, shape of a row."""
-    count, total, power = 0, 0.0, 0.0
+    count, total, power = 0, np.zeros(()), np.zeros(())
     for part in parts:
         count += len(part)
         total = total + part.sum(axis=0)
         power = power + (part**2).sum(axis=0)
-    mean = np.asarray(total) / count
-    found: FloatArray = np.sqrt(np.maximum(np.asarray(power) / count - mean**2, 0.0))
+    mean = total / count
+    found: FloatArray = np.sqrt(np.maximum(power / count - mean**2, 0.0))
     return found
 
 
