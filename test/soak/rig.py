@@ -25,7 +25,7 @@ from time import monotonic, time
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
-from ros.conftest import Graph
+from ros.conftest import Graph, Process
 from ros.relay import Faults, Relay
 from ros.rig import COMMAND, goal, LATE, NODES, Rig, stamp, values
 from sensor_msgs.msg import JointState
@@ -61,17 +61,81 @@ DISTURBED = (*LATE, 'set back')
 DEADLINE = 60.0
 """Time within which anything must happen [s]."""
 
+MOST_FAILURES = 11
+"""After so many a run ends."""
+
+KINDS = ('plain', 'mismatch', 'noise', 'replan', 'stop', 'transport', 'invalid')
+"""What may happen to a motion; in real time the nodes may be killed, too."""
+
 MEMORY_PERIOD = 2.0
 """Time between two looks at the memory of the nodes [s]."""
 
 
-def tell(failure: str) -> str:
-    """Show what must not happen when it happens, and return it."""
-    print(f'{datetime.now():%H:%M:%S} {failure}', file=sys.stderr)
-    return failure
+class Endurance:
+    """
+    Episodes that follow each other, what must not happen in them, and the memory of processes.
+
+    Attributes
+    ----------
+    counts
+        How often anything happened.
+    failures
+        What must not happen, a sentence each.
+    memory
+        Resident memory of each process, (node, process id) to lists of (seconds, bytes).
+    offsets
+        How far joint states are behind the time of day, (seconds, seconds).
+    processes
+        Those that have to live, by their nodes' names.
+
+    """
+
+    kinds: tuple[str, ...]
+
+    def __init__(self, graph: Graph, seed: int, **given) -> None:
+        """Start to count; what is given is for the nodes' class."""
+        self.random = np.random.default_rng(seed)
+        self.counts: Counter[str] = Counter()
+        self.failures: list[str] = []
+        self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
+        self.offsets: list[tuple[float, float]] = []
+        self.processes: dict[str, Process] = {}
+        self._born, self._looked = monotonic(), 0.0
+        super().__init__(graph, **given)
+
+    def run(self, seconds: float) -> None:
+        """Let episodes follow each other for a time [s]; a failure is told when it happens."""
+        until = monotonic() + seconds
+        while monotonic() < until and len(self.failures) < MOST_FAILURES:
+            kind = str(self.random.choice(self.kinds))
+            try:
+                self._episode(kind)
+            except (AssertionError, pytest.fail.Exception) as error:
+                self.failures.append(f'{kind}: {error}')
+                print(f'{datetime.now():%H:%M:%S} {self.failures[-1]}', file=sys.stderr)
+                self._start_afresh()
+        self.counts['seconds'] = round(monotonic() - self._born)
+
+    def _start_afresh(self) -> None:
+        """Undo what an episode that failed has left."""
+
+    def watch(self, name: str, process: Process) -> None:
+        """Look after a process from now on."""
+        self.processes[name] = process
+        self.memory[name, process.pid] = []
+
+    def _look(self) -> None:
+        """Note the memory of the nodes, and that they live."""
+        if monotonic() - self._looked < MEMORY_PERIOD:
+            return
+        self._looked = monotonic()
+        for name, process in self.processes.items():
+            assert process.exit_code is None, f'{name} has ended: {process.stderr[-2000:]}'
+            pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[1])
+            self.memory[name, process.pid].append((monotonic() - self._born, pages * 4096))
 
 
-class Soak(Rig):
+class Soak(Endurance, Rig):
     """
     Three nodes of one arm and what is done to them.
 
@@ -86,27 +150,13 @@ class Soak(Rig):
     seed
         Of all that is random.
 
-    Attributes
-    ----------
-    counts
-        How often anything happened.
-    failures
-        What must not happen, a sentence each.
-    memory
-        Resident memory of each process, (node, process id) to lists of (seconds, bytes).
-
     """
 
     def __init__(self, graph: Graph, file: str, speed: float | None, seed: int) -> None:
         """Start the nodes."""
-        super().__init__(graph)
+        super().__init__(graph, seed)
         self.speed = speed
-        self.random = np.random.default_rng(seed)
-        self.counts: Counter[str] = Counter()
-        self.failures: list[str] = []
-        self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
-        self.offsets: list[tuple[float, float]] = []
-        self._born, self._looked = monotonic(), 0.0
+        self.kinds = KINDS if speed is not None else (*KINDS, *(f'kill {name}' for name in NODES))
         self._parameters = {
             'flat_planner:start_delay': 0.3,
             'flat_planner:replan.lookahead': 0.6,
@@ -134,7 +184,6 @@ class Soak(Rig):
         graph.probe.create_subscription(JointState, '/joint_states', self._on_state, NEWEST)
         self.hear_planner(matched=False)
         self.hear_monitor(matched=False)
-        self.processes = {}
         for name in NODES:
             self.start(name)
         self._expect(lambda: self.state, 'joint states')
@@ -148,30 +197,13 @@ class Soak(Rig):
             words += ['-p', f'{key}:={value}']
         words += ['-r', 'flat_plant:flat_planner/joint_trajectory:=/late/joint_trajectory']
         process = self.graph.start(name, *words)
-        self.processes[name] = process
-        self.memory[name, process.pid] = []
+        self.watch(name, process)
         self._expect(lambda: len(self.graph.logged('ready')) > ready, f'{name}')
 
     def kill(self, name: str) -> None:
         """End a node by SIGKILL."""
         self.processes.pop(name).kill()
         self.counts['kills'] += 1
-
-    def run(self, seconds: float) -> None:
-        """Let episodes follow each other for a time [s]."""
-        until = monotonic() + seconds
-        kinds = ['plain', 'mismatch', 'noise', 'replan', 'stop', 'transport', 'invalid']
-        if self.speed is None:
-            kinds += ['kill planner_node', 'kill plant_node', 'kill monitor_node']
-        while monotonic() < until:
-            kind = str(self.random.choice(kinds))
-            try:
-                self._episode(kind)
-            except (AssertionError, pytest.fail.Exception) as error:
-                self.failures.append(tell(f'{kind}: {error}'))
-                if len(self.failures) > 10:
-                    break
-        self.counts['seconds'] = round(monotonic() - self._born)
 
     def _episode(self, kind: str) -> None:
         """Move once, with whatever happens."""
@@ -348,17 +380,7 @@ class Soak(Rig):
         """Wait for a condition, and look at the memory meanwhile."""
 
         def holds() -> object:
-            now = monotonic()
-            if now - self._looked > MEMORY_PERIOD:
-                self._looked = now
-                self._look()
+            self._look()
             return condition()
 
         self.graph.expect(holds, what, DEADLINE)
-
-    def _look(self) -> None:
-        """Note the memory of the nodes, and that they live."""
-        for name, process in self.processes.items():
-            assert process.exit_code is None, f'{name} has ended: {process.stderr[-2000:]}'
-            pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[1])
-            self.memory[name, process.pid].append((monotonic() - self._born, pages * 4096))

@@ -16,17 +16,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
 import os
-from pathlib import Path
 import signal
 from time import monotonic
 
 import numpy as np
-import pytest
 from ros.conftest import Graph
 from ros.tracked_arm import ELDER, Tracked
-from soak.rig import tell
+from soak.rig import Endurance
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
@@ -49,9 +46,6 @@ FROZEN = 0.5
 REMEMBERED = 3.0
 """Real time for which a tracker counts as alive after its last word [s]."""
 
-MEMORY_PERIOD = 2.0
-"""Real time between two looks at the memory of the nodes [s]."""
-
 KINDS = (
     *('plain', 'wrong model', 'push', 'release', 'doubled'),
     *('SIGINT', 'SIGTERM', 'SIGKILL', 'SIGSTOP'),
@@ -59,9 +53,9 @@ KINDS = (
 """What may happen to a motion."""
 
 
-class TrackedSoak(Tracked):
+class TrackedSoak(Endurance, Tracked):
     """
-    A tracked arm and what is done to it; attributes as of `Soak`.
+    A tracked arm and what is done to it.
 
     Parameters
     ----------
@@ -72,40 +66,19 @@ class TrackedSoak(Tracked):
 
     """
 
+    kinds = KINDS
+
     def __init__(self, graph: Graph, seed: int) -> None:
         """Start the nodes."""
-        self.random = np.random.default_rng(seed)
-        self.counts: Counter[str] = Counter()
-        self.failures: list[str] = []
-        self.memory: dict[tuple[str, int], list[tuple[float, float]]] = {}
-        self.offsets: list[tuple[float, float]] = []
-        self.processes = {}
         self.trackers = []
-        self._born, self._looked = monotonic(), 0.0
-        super().__init__(graph, **PLANT)
-        self.processes['plant_node'] = self.plant
-        self.memory['plant_node', self.plant.pid] = []
+        super().__init__(graph, seed, **PLANT)
+        self.watch('plant_node', self.plant)
 
     def start_tracker(self, **given) -> None:
         """Start a tracker with a limit."""
         super().start_tracker(**{**TRACKER, 'limits.effort': f'[{LIMIT}]', **given})
-        self.processes['tracker_node'] = self.tracker
+        self.watch('tracker_node', self.tracker)
         self.trackers.append(self.tracker)
-        self.memory['tracker_node', self.tracker.pid] = []
-
-    def run(self, seconds: float) -> None:
-        """Let episodes follow each other for a time [s]."""
-        until = monotonic() + seconds
-        while monotonic() < until:
-            kind = str(self.random.choice(KINDS))
-            try:
-                self._episode(kind)
-            except (AssertionError, pytest.fail.Exception) as error:
-                self.failures.append(tell(f'{kind}: {error}'))
-                if len(self.failures) > 10:
-                    break
-                self._start_afresh()
-        self.counts['seconds'] = round(monotonic() - self._born)
 
     def _start_afresh(self) -> None:
         """Leave one tracker, a new one, whatever an episode that failed has left."""
@@ -254,13 +227,3 @@ class TrackedSoak(Tracked):
         late = [text for text in said if 'joint sample' in text or 'joint states' in text]
         assert len(said) == len(late), said
         return bool(late)
-
-    def _look(self) -> None:
-        """Note the memory of the nodes, and that they live."""
-        if monotonic() - self._looked < MEMORY_PERIOD:
-            return
-        self._looked = monotonic()
-        for name, process in self.processes.items():
-            assert process.exit_code is None, f'{name} has ended: {process.stderr[-2000:]}'
-            pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[1])
-            self.memory[name, process.pid].append((monotonic() - self._born, pages * 4096))
