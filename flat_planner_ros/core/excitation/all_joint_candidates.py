@@ -19,15 +19,13 @@ from dataclasses import dataclass
 from itertools import product
 from math import pi
 
-from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, PlanarArm
-from flat_planner_ros.core.excitation.candidates import Candidate, REFINEMENT, SAMPLING
+from flat_planner_ros.core.arm import FloatArray, PlanarArm
+from flat_planner_ros.core.excitation.candidates import Candidate, planned, REFINEMENT, SAMPLING
 from flat_planner_ros.core.excitation.settings import Room
 from flat_planner_ros.core.model_fit import FirstMotion, foresee, ForeseenMotion
 from flat_planner_ros.core.planning import (
     JointLimits,
-    MotionRequest,
     Plan,
-    plan,
     PlanningOptions,
 )
 import numpy as np
@@ -184,19 +182,15 @@ def _within_efforts(
 ) -> Plan | None:
     """Return a plan with distances shortened to what the efforts allow, None where that fails."""
     for _ in range(SHORTENINGS):
-        final = start + np.append(distances, 0.0)
-        request = MotionRequest(start=start, final=final, duration=duration)
-        try:
-            made = plan(request, arm, options)
-        except FlatPlannerError:
+        made = planned(start, start + np.append(distances, 0.0), duration, arm, options)
+        if made is None:
             return None
         samples = made.at(np.linspace(0.0, duration, round(duration / SAMPLING) + 1))
         weight = arm.gravity_effort(samples.positions)[:, :-1]
         allowed = bounds.shares * bounds.room.efforts
         used = float((np.abs(samples.efforts[:, :-1] - weight) / allowed).max())
         if used <= 1.0:
-            use = bounds.limits.worst(made)
-            return made if use is None or not use.is_exceeded else None
+            return None if bounds.limits.are_exceeded_by(made) else made
         distances = distances * WITHIN / used
     return None
 

@@ -21,7 +21,13 @@ from math import inf, pi
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, PlanarArm
 from flat_planner_ros.core.excitation.settings import Room
 from flat_planner_ros.core.model_fit import foresee, ForeseenMotion
-from flat_planner_ros.core.planning import JointLimits, MotionRequest, plan, PlanningOptions
+from flat_planner_ros.core.planning import (
+    JointLimits,
+    MotionRequest,
+    Plan,
+    plan,
+    PlanningOptions,
+)
 import numpy as np
 
 DURATIONS = (1.0, 1.6, 2.6, 4.2)
@@ -87,6 +93,11 @@ class Bounds:
     share: float
     margin: float
 
+    def allow_plan(self, made: Plan) -> bool:
+        """Tell whether a plan takes no more of the motor of joint n-1 and obeys the limits."""
+        most = self.share * self.room.effort
+        return float(made.peak_effort[-2]) <= most and not self.limits.are_exceeded_by(made)
+
     def allow(self, motion: ForeseenMotion, here: float) -> bool:
         """Tell whether a motion that starts at an angle of joint n-1 [rad] stays inside."""
         room, wider = self.room, 1.0 + self.margin
@@ -129,27 +140,26 @@ def candidates(
     """
     period = 2 * pi / estimate.natural_mode().frequency
     room = bounds.room
+    start = np.append(here[:-1], 0.0)
     at = float(here[-2])
     up, down = room.high - at, at - room.low
     largest = min(bounds.share * (room.high - room.low), max(up, down) / (1.0 + bounds.margin))
     toward = 1.0 if up >= down else -1.0
     for distance in DISTANCES:
-        final = np.array(here, dtype=float)
-        final[-1] = 0.0
+        final = start.copy()
         final[-2] += toward * distance * largest
         for duration in DURATIONS:
-            found = _planned(here, final, duration * period, planned_by, options, bounds)
-            if found is None:
+            made = planned(start, final, duration * period, planned_by, options)
+            if made is None or not bounds.allow_plan(made):
                 continue
-            effort, peak = found
-            effort = np.append(effort, np.zeros(round(rest * period / SAMPLING)))
+            effort = np.append(_efforts_of(made), np.zeros(round(rest * period / SAMPLING)))
             times = np.linspace(0.0, SAMPLING * (effort.size - 1), effort.size)
             motion = foresee(estimate, times, effort, REFINEMENT)
             if bounds.allow(motion, at):
                 yield Candidate(
                     final=final,
                     duration=duration * period,
-                    peak_effort=peak,
+                    peak_effort=float(made.peak_effort[-2]),
                     motion=motion,
                     most_effort=_last_only(here.size, bounds),
                 )
@@ -162,28 +172,23 @@ def _last_only(joints: int, bounds: Bounds) -> FloatArray:
     return most
 
 
-def _planned(
-    here: FloatArray,
+def planned(
+    start: FloatArray,
     final: FloatArray,
     duration: float,
     arm: PlanarArm,
     options: PlanningOptions,
-    bounds: Bounds,
-) -> tuple[FloatArray, float] | None:
-    """Return the efforts of joint n-1 (m,) and their peak [N m], None where not allowed."""
-    start = np.array(here, dtype=float)
-    start[-1] = 0.0
+) -> Plan | None:
+    """Return the plan from rest to rest, None where there is none."""
     request = MotionRequest(start=start, final=final, duration=duration)
     try:
-        made = plan(request, arm, options)
+        return plan(request, arm, options)
     except FlatPlannerError:
         return None
-    peak = float(made.peak_effort[-2])
-    if peak > bounds.share * bounds.room.effort:
-        return None
-    use = bounds.limits.worst(made)
-    if use is not None and use.is_exceeded:
-        return None
-    times = np.arange(0.0, duration + SAMPLING, SAMPLING)
-    efforts = made.at(np.minimum(times, duration)).efforts[:, -2]
-    return np.where(times < duration, efforts, 0.0), peak
+
+
+def _efforts_of(made: Plan) -> FloatArray:
+    """Return the efforts of joint n-1, zero after the end of the motion, shape (m,) [N m]."""
+    times = np.arange(0.0, made.duration + SAMPLING, SAMPLING)
+    efforts = made.at(np.minimum(times, made.duration)).efforts[:, -2]
+    return np.where(times < made.duration, efforts, 0.0)

@@ -24,6 +24,7 @@ from math import inf, pi
 
 from flat_planner_ros.core.arm import FlatPlannerError, FloatArray, InvalidRequest, PlanarArm
 from flat_planner_ros.core.excitation.candidates import Bounds, Candidate, candidates, REFINEMENT
+from flat_planner_ros.core.excitation.certainty import relative_errors
 from flat_planner_ros.core.excitation.first_joints import FirstJoints
 from flat_planner_ros.core.excitation.motions import Heard, joined, Proposal
 from flat_planner_ros.core.excitation.settings import (
@@ -31,7 +32,6 @@ from flat_planner_ros.core.excitation.settings import (
     GROWTH,
     PLAUSIBLE,
     Room,
-    ROUGH,
 )
 from flat_planner_ros.core.model_fit import (
     first_misprediction,
@@ -113,7 +113,6 @@ class Excitation:
         self._firsts: FirstJoints | None = None
         if room.firsts:
             self._firsts = FirstJoints(arm, options, limits, room, self.settings)
-        self._moves_all = False
         self._parts_of_all = 0
 
     @property
@@ -162,6 +161,11 @@ class Excitation:
         """Tell whether the last two links are as certain as wanted."""
         return bool((self._reached[:SOUGHT] <= self.settings.accuracy).all())
 
+    @property
+    def _moving_firsts(self) -> FirstJoints | None:
+        """Return the first joints if they move next: the last two links are known by then."""
+        return self._firsts if self._are_last_certain and self._margin == NARROW else None
+
     def propose(self, here: FloatArray) -> Proposal:
         """
         Return the motion that makes the least certain parameter most certain.
@@ -177,9 +181,8 @@ class Excitation:
             No motion is allowed from here.
 
         """
-        if self._firsts is not None and self._are_last_certain and self._margin == NARROW:
-            return self._with_all_joints(self._firsts, here)
-        self._moves_all = False
+        if self._moving_firsts is not None:
+            return self._with_all_joints(self._moving_firsts, here)
         bounds = Bounds(
             limits=self._limits, room=self._room, share=self._share, margin=self._margin
         )
@@ -196,11 +199,16 @@ class Excitation:
                 f'{self._room.high:.4g} rad; raise the limits, or let the arm swing out'
             )
         self._scales = np.maximum(self._scales, np.max([scales for *_, scales in found], axis=0))
-        after = [self._errors(self._known + told) for _, told, _ in found]
+        after = [relative_errors(self._known + told, self._scales) for _, told, _ in found]
         best = min(range(len(found)), key=lambda index: after[index][:SOUGHT].max())
-        before = self._errors(self._known)
+        before = relative_errors(self._known, self._scales)
+        firsts = np.empty(0) if self._firsts is None else self._firsts.errors
         return self._proposal(
-            found[best][0], here, NAMES[int(np.argmax(before[:SOUGHT]))], before, after[best]
+            found[best][0],
+            here,
+            NAMES[int(np.argmax(before[:SOUGHT]))],
+            np.append(before, firsts),
+            np.append(after[best], firsts),
         )
 
     def hear(self, measurements: Measurements) -> Heard:
@@ -219,8 +227,8 @@ class Excitation:
             arm is not what the model says.
 
         """
-        if self._firsts is not None and self._moves_all:
-            return self._heard_all(self._firsts, measurements)
+        if self._moving_firsts is not None:
+            return self._heard_all(self._moving_firsts, measurements)
         self._check_signs(measurements)
         wrong = misprediction(self._estimate, measurements)
         holds = bool((wrong <= self.settings.agreement).all())
@@ -259,8 +267,7 @@ class Excitation:
     def _with_all_joints(self, firsts: FirstJoints, here: FloatArray) -> Proposal:
         """Return the motion that makes the least certain of the first links most certain."""
         chosen = firsts.choose(here, self._estimate, float(self._noise[-1]))
-        self._moves_all = True
-        last = self._errors(self._known)
+        last = relative_errors(self._known, self._scales)
         return self._proposal(
             chosen.candidate.candidate,
             here,
@@ -282,11 +289,6 @@ class Excitation:
         scales = self._scales
         if self._firsts is not None:
             scales = np.append(scales, self._firsts.scales)
-            others = self._firsts.errors
-            before, after = (
-                errors if errors.size == scales.size else np.append(errors, others)
-                for errors in (before, after)
-            )
         return Proposal(
             candidate=candidate,
             sought=sought,
@@ -357,10 +359,3 @@ class Excitation:
                 'passive joint: are the units of the efforts right, is friction above '
                 f'{self._share:.2g} of the effort limit, does something touch the arm?'
             )
-
-    def _errors(self, known: FloatArray) -> FloatArray:
-        """Return standard errors relative to the scales (8,), from what is known and believed."""
-        size = np.outer(self._scales, self._scales)
-        inside = known * size + np.eye(len(NAMES)) / ROUGH**2
-        result: FloatArray = np.sqrt(np.diag(np.linalg.inv(inside)))
-        return result

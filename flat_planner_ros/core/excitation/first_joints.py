@@ -23,12 +23,12 @@ from flat_planner_ros.core.excitation.all_joint_candidates import (
     AllBounds,
     AllJointsCandidate,
 )
+from flat_planner_ros.core.excitation.certainty import relative_errors, ROUGH
 from flat_planner_ros.core.excitation.settings import (
     ExcitationSettings,
     GROWTH,
     PLAUSIBLE,
     Room,
-    ROUGH,
 )
 from flat_planner_ros.core.model_fit import (
     first_information,
@@ -124,7 +124,7 @@ class FirstJoints:
     @property
     def errors(self) -> FloatArray:
         """Return standard errors relative to the scales as known or believed, shape (5 k,) [-]."""
-        return self._errors(self._known)
+        return relative_errors(self._known, self.scales)
 
     @property
     def untold(self) -> tuple[str, ...]:
@@ -178,8 +178,10 @@ class FirstJoints:
             quickest = min(one.candidate.duration for one, *_ in found)
             found = [each for each in found if each[0].candidate.duration == quickest]
         self.scales = np.maximum(self.scales, np.max([scales for *_, scales in found], axis=0))
-        before = self._errors(self._known)
-        after = np.array([self._errors(self._known + told) for _, told, _ in found])
+        before = relative_errors(self._known, self.scales)
+        after = np.array(
+            [relative_errors(self._known + told, self.scales) for _, told, _ in found]
+        )
         alone = np.diag(sum((told for _, told, _ in found), self._known)) * self.scales**2
         self._is_hidden = (alone + ROUGH**-2) ** -0.5 > TELLS * ROUGH
         wanted = self._is_sought & ~self._is_hidden
@@ -269,13 +271,6 @@ class FirstJoints:
                 f'of the efforts right, is friction above {self.shares[~holds].max():.2g} of the '
                 'effort limit, does something touch the arm?'
             )
-
-    def _errors(self, known: FloatArray) -> FloatArray:
-        """Return standard errors relative to the scales (5 k,) by what is known and believed."""
-        size = np.outer(self.scales, self.scales)
-        inside = known * size + np.eye(self.scales.size) / ROUGH**2
-        result: FloatArray = np.sqrt(np.diag(np.linalg.inv(inside)))
-        return result
 
 
 def _worst_first(errors: FloatArray) -> list[int]:

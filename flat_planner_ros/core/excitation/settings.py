@@ -20,9 +20,6 @@ from flat_planner_ros.core.arm import check_number, FloatArray, InvalidRequest
 from flat_planner_ros.core.planning import JointLimits
 import numpy as np
 
-ROUGH = 0.3
-"""Standard error of what is believed at the start, relative to the scales [-]."""
-
 GROWTH = 2.0
 """How much larger a motion may be than one that was as predicted [-]."""
 

@@ -19,10 +19,9 @@ from flat_planner_ros.core.model_fit.first_fit import FirstFit, fit_first_links
 from flat_planner_ros.core.model_fit.first_information import (
     first_information,
     first_misprediction,
-    first_motions,
-    FirstMotion,
 )
 from flat_planner_ros.core.model_fit.first_links import KINDS, parameters_of, with_first_links
+from flat_planner_ros.core.model_fit.first_motion import first_motions, FirstMotion
 from flat_planner_ros.core.model_fit.fit import fit_model, Trust
 from flat_planner_ros.core.model_fit.information import (
     foresee,

@@ -21,35 +21,29 @@ from flat_planner_ros.core.arm import FloatArray, PlanarArm
 from flat_planner_ros.core.model_fit.correlation import correlation_length, lags_for, products
 from flat_planner_ros.core.model_fit.first_links import (
     Chain,
-    ChainSignals,
     COULOMB,
     first_scales,
+    inertia_of,
     KINDS,
     MOMENT,
+    noise_of_rows,
     OFFSET,
     OWN,
     parameters_of,
-    rows,
     VISCOUS,
+)
+from flat_planner_ros.core.model_fit.first_motion import (
+    ChainRows,
+    first_motions,
+    rows_of,
+    Windowed,
+    windowed,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
 from flat_planner_ros.core.model_fit.observation import LONGER
 from flat_planner_ros.core.model_fit.refinement import neighbours
-from flat_planner_ros.core.model_fit.signals import span_for, stretches
-from flat_planner_ros.core.model_fit.weak_form import OVERLAP, Windows
+from flat_planner_ros.core.model_fit.weak_form import OVERLAP
 import numpy as np
-
-WINDOW, SHORTEST = 0.5, 26
-"""Length of a window, in free periods of the passive joint [-] and at least in samples."""
-
-POWER = 6
-"""A window is (1 - x^2)^POWER, so smooth at its ends that sums are as good as integrals."""
-
-SMOOTHING = 0.15
-"""Longest span of the polynomials that smooth velocities, in free periods [-]."""
-
-MOSTLY = 0.3
-"""Share of a window at rest from which it tells nothing of that joint [-]."""
 
 TOLD = 0.3
 """Largest standard error of a parameter that counts as told, relative to its scale [-]."""
@@ -114,14 +108,6 @@ class FirstFit(NamedTuple):
     misfit: str
 
 
-class _Rows(NamedTuple):
-    """Rows of all windows: slopes (w, m, P), what is left (w, m) and weights (w, m)."""
-
-    slopes: FloatArray
-    left: FloatArray
-    weights: FloatArray
-
-
 def fit_first_links(
     measurements: Measurements,
     start: PlanarArm,
@@ -145,7 +131,13 @@ def fit_first_links(
 
     """
     chain = Chain.of(start, last_friction)
-    parts = _signals(measurements, period, delay)
+    noise = noise_of(measurements)
+
+    def seen(*, longer: float = 1.0, every: int = 1) -> list[Windowed]:
+        motions = first_motions(measurements, delay, every=every)
+        return windowed(motions, period, measurements.period, noise, longer=longer)
+
+    parts = seen()
     believed = parameters_of(start)
     scales = _scales(parts, start)
     free = list(range(believed.size))
@@ -169,12 +161,12 @@ def fit_first_links(
     whole = np.zeros((values.size, values.size))
     whole[np.ix_(free, free)] = errors * np.outer(scales[free], scales[free])
     for weight, changed in (
-        (1.0, _signals(measurements, period, delay, longer=LONGER)),
-        (1 / COARSER, _signals(measurements, period, delay, every=2)),
+        (1.0, seen(longer=LONGER)),
+        (1 / COARSER, seen(every=2)),
     ):
         other, _ = _solved(changed, chain, values, free, scales)
         whole += weight**2 * np.outer(other - values, other - values)
-    misfit = _doubt(found, values, chain, noise_of(measurements), parts)
+    misfit = _doubt(found, values, chain, noise, parts)
     sizes = _sizes(scales, values, believed)
     stds = np.sqrt(np.diag(whole))
     is_told = (stds <= TOLD * sizes) | (np.abs(values - believed) >= CERTAIN * stds)
@@ -197,31 +189,7 @@ def _sizes(scales: FloatArray, values: FloatArray, believed: FloatArray) -> Floa
     return sizes.ravel()
 
 
-def _signals(
-    measurements: Measurements, period: float, delay: float, *, longer: float = 1.0, every: int = 1
-) -> list[tuple[ChainSignals, Windows]]:
-    """Return each stretch without gaps on an even grid, with its windows; `every` k-th effort."""
-    found = []
-    sample = measurements.period
-    noise = float(np.linalg.norm(noise_of(measurements)[:-1]))
-    span = longer * span_for(noise, sample, SMOOTHING * period)
-    for first, last in stretches(measurements.times, sample):
-        times = measurements.times[first:last]
-        count = round(float(times[-1] - times[0]) / sample) + 1
-        length = max(WINDOW * period, SHORTEST * sample)
-        if count <= length / sample + 2:
-            continue
-        grid = np.linspace(times[0], times[-1], count)
-        windows = Windows(grid, length, POWER)
-        absolute = np.cumsum(measurements.positions[first:last], axis=1)[:, :-1]
-        angles = np.column_stack([np.interp(grid, times, column) for column in absolute.T])
-        known, efforts = times[::every], measurements.efforts[first:last:every].T
-        acting = np.column_stack([np.interp(grid - delay, known, each) for each in efforts])
-        found.append((ChainSignals.of(grid, angles, acting, span), windows))
-    return found
-
-
-def _scales(parts: list[tuple[ChainSignals, Windows]], start: PlanarArm) -> FloatArray:
+def _scales(parts: list[Windowed], start: PlanarArm) -> FloatArray:
     """Return how far each parameter may reasonably be off, shape (5 m,)."""
     effort, rate = np.zeros(start.n - 2), np.zeros(start.n - 2)
     for signals, _ in parts:
@@ -231,31 +199,20 @@ def _scales(parts: list[tuple[ChainSignals, Windows]], start: PlanarArm) -> Floa
     return first_scales(start, effort, rate)
 
 
-def _rows_around(
-    parts: list[tuple[ChainSignals, Windows]], chain: Chain, values: FloatArray
-) -> _Rows:
-    """Return the rows of all stretches; those in which a joint of theirs rests have no weight."""
-    count = values.size // len(KINDS)
-    slopes, left, weights = [np.empty((0, count, values.size))], [np.empty((0, count))], []
-    weights.append(left[0])
-    for signals, windows in parts:
-        by, rest = rows(signals, windows, chain, values)
-        still = np.column_stack([windows(column) for column in signals.resting.T])
-        slopes.append(by)
-        left.append(rest)
-        weights.append((np.maximum(still[:, :-1], still[:, 1:]) < MOSTLY).astype(float))
-    whole = _Rows(np.concatenate(slopes), np.concatenate(left), np.concatenate(weights))
+def _rows_around(parts: list[Windowed], chain: Chain, values: FloatArray) -> ChainRows:
+    """Return the rows of all stretches, their weights those of what is left."""
+    whole = rows_of(parts, chain, values)
     spread = np.sqrt(np.average(whole.left**2, axis=0, weights=whole.weights + 1e-12))
     return whole._replace(weights=whole.weights / np.maximum(spread, 1e-300) ** 2)
 
 
 def _solved(
-    parts: list[tuple[ChainSignals, Windows]],
+    parts: list[Windowed],
     chain: Chain,
     values: FloatArray,
     free: list[int],
     scales: FloatArray,
-) -> tuple[FloatArray, _Rows]:
+) -> tuple[FloatArray, ChainRows]:
     """Return the free parameters with the least weighted sum of squares, and the rows there."""
     around = _rows_around(parts, chain, values)
     for _ in range(STEPS):
@@ -277,7 +234,7 @@ def _solved(
     return values, around
 
 
-def _covariance(around: _Rows, free: list[int], scales: FloatArray) -> FloatArray:
+def _covariance(around: ChainRows, free: list[int], scales: FloatArray) -> FloatArray:
     """
     Return the covariance of the free parameters, in units of their scales.
 
@@ -298,7 +255,7 @@ def _covariance(around: _Rows, free: list[int], scales: FloatArray) -> FloatArra
     return result
 
 
-def _alike(around: _Rows) -> float:
+def _alike(around: ChainRows) -> float:
     """Return how many windows are worth one, at most those that overlap [-]."""
     used = [
         left[weight > 0.0] for left, weight in zip(around.left.T, around.weights.T, strict=True)
@@ -309,18 +266,19 @@ def _alike(around: _Rows) -> float:
 
 
 def _doubt(
-    around: _Rows,
+    around: ChainRows,
     values: FloatArray,
     chain: Chain,
     noise: FloatArray,
-    parts: list[tuple[ChainSignals, Windows]],
+    parts: list[Windowed],
 ) -> str:
     """Return what the rows leave unexplained, empty if noise explains it."""
+    if not parts:
+        return ''
     count = values.size // len(KINDS)
     own, moment = values.reshape(len(KINDS), count)[[OWN, MOMENT]]
-    inertia = np.diag(own) + np.triu(np.outer(chain.lengths, moment), k=1)
-    inertia += np.triu(inertia, k=1).T
-    spread = np.sqrt(np.cumsum(noise[:count] ** 2))
+    inertia = inertia_of(own, moment, chain.lengths)
+    by_noise = noise_of_rows(inertia, noise, parts[0].windows.gain(2))
     found = []
     for i in range(count):
         is_used = around.weights[:, i] > 0.0
@@ -328,8 +286,7 @@ def _doubt(
             continue
         left = sqrt(np.mean(around.left[is_used, i] ** 2))
         effort = max(float(signals.efforts[:, i].std()) for signals, _ in parts)
-        by_noise = float(np.linalg.norm(inertia[i] * spread)) * parts[0][1].gain(2)
-        allowed = float(np.hypot(by_noise, FLOOR * effort))
+        allowed = float(np.hypot(by_noise[i], FLOOR * effort))
         if left > EXCESS * allowed:
             found.append(f'{left:.2g} N m at link {i + 1} where {allowed:.2g} N m are allowed')
     return '; '.join(found)

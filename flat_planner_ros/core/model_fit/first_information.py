@@ -18,49 +18,27 @@ from math import pi
 from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray, PlanarArm
-from flat_planner_ros.core.model_fit.first_fit import (
-    MOSTLY,
-    POWER,
-    SHORTEST,
-    SMOOTHING,
-    WINDOW,
-)
 from flat_planner_ros.core.model_fit.first_links import (
     Chain,
-    ChainSignals,
     first_scales,
     KINDS,
+    noise_of_rows,
     OFFSET,
     parameters_of,
-    rows,
+)
+from flat_planner_ros.core.model_fit.first_motion import (
+    ChainRows,
+    first_motions,
+    FirstMotion,
+    rows_of,
+    windowed,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements, noise_of
-from flat_planner_ros.core.model_fit.signals import span_for, stretches
-from flat_planner_ros.core.model_fit.weak_form import OVERLAP, Windows
+from flat_planner_ros.core.model_fit.weak_form import OVERLAP
 import numpy as np
 
 UNMODELLED = 0.003
 """Error of a row that comes with the noise's, relative to its effort [-]: of sampled efforts."""
-
-
-class FirstMotion(NamedTuple):
-    """
-    Motion of all joints, sampled evenly.
-
-    Attributes
-    ----------
-    times
-        Shape (m,) [s].
-    positions
-        Joint angles, shape (m, n) [rad].
-    efforts
-        Of the actuated joints when they act, shape (m, n-1) [N m].
-
-    """
-
-    times: FloatArray
-    positions: FloatArray
-    efforts: FloatArray
 
 
 def first_information(
@@ -86,9 +64,9 @@ def first_information(
         counting as one; and how far each may reasonably be off, shape (5 k,).
 
     """
-    slopes, left, net, weights, gain = _rows_of(arm, [motion], noise)
-    spread = _noise_of_rows(arm, noise, gain)
-    spread = np.hypot(spread, UNMODELLED * net.std(axis=0) if len(net) else 0.0)
+    sample = float(motion.times[1] - motion.times[0])
+    (slopes, _, weights), net, by_noise = _told(arm, [motion], sample, noise)
+    spread = np.hypot(by_noise, UNMODELLED * net.std(axis=0) if len(net) else 0.0)
     weighted = slopes * (weights / np.maximum(spread, 1e-300) ** 2)[:, :, None]
     told = np.einsum('wmp,wmq->pq', weighted, slopes) / OVERLAP
     return told, _scales(arm, motion)
@@ -116,10 +94,9 @@ def first_misprediction(arm: PlanarArm, measurements: Measurements, delay: float
 
     """
     noise = noise_of(measurements)
-    parts = first_motions(measurements, delay)
-    _, left, net, weights, gain = _rows_of(arm, parts, noise)
+    motions = first_motions(measurements, delay)
+    (_, left, weights), net, by_noise = _told(arm, motions, measurements.period, noise)
     result = np.ones(arm.n - 2)
-    by_noise = _noise_of_rows(arm, noise, gain)
     for i in range(arm.n - 2):
         is_used = weights[:, i] > 0.0
         if np.count_nonzero(is_used) > OVERLAP:
@@ -129,84 +106,24 @@ def first_misprediction(arm: PlanarArm, measurements: Measurements, delay: float
     return result
 
 
-def first_motions(measurements: Measurements, delay: float) -> list[FirstMotion]:
-    """
-    Return each stretch without gaps on an even grid, with the efforts that act there.
+class _Told(NamedTuple):
+    """Rows, the efforts that they explain and leave (w, m), and what noise does to them (m,)."""
 
-    Parameters
-    ----------
-    measurements
-        Of an arm of three or more joints.
-    delay
-        By which efforts act later than they are stamped [s].
-
-    """
-    found = []
-    for first, last in stretches(measurements.times, measurements.period):
-        times = measurements.times[first:last]
-        count = round(float(times[-1] - times[0]) / measurements.period) + 1
-        if count < SHORTEST:
-            continue
-        grid = np.linspace(times[0], times[-1], count)
-        positions, efforts = (
-            np.column_stack([np.interp(grid - late, times, column) for column in array.T])
-            for array, late in (
-                (measurements.positions[first:last], 0.0),
-                (measurements.efforts[first:last], delay),
-            )
-        )
-        found.append(FirstMotion(grid, positions, efforts))
-    return found
-
-
-class _ChainRows(NamedTuple):
-    """Slopes (w, k, 5 k), what is left (w, k), net efforts (w, k), weights (w, k), and a gain."""
-
-    slopes: FloatArray
-    left: FloatArray
+    rows: ChainRows
     net: FloatArray
-    weights: FloatArray
-    gain: float
+    by_noise: FloatArray
 
 
-def _rows_of(arm: PlanarArm, parts: list[FirstMotion], noise: FloatArray) -> _ChainRows:
-    """Return the rows of all parts; those in which a joint of theirs rests have no weight."""
+def _told(arm: PlanarArm, motions: list[FirstMotion], sample: float, noise: FloatArray) -> _Told:
+    """Return what motions tell around a model; `sample` is the time between samples [s]."""
     count = arm.n - 2
     friction = float(arm.viscous_friction[-1]), float(arm.coulomb_friction[-1])
-    chain, values = Chain.of(arm, friction), parameters_of(arm)
-    slopes, left = [np.empty((0, count, values.size))], [np.empty((0, count))]
-    net, weights = [left[0]], [left[0]]
-    gain = 0.0
-    period = 2 * pi / arm.natural_mode().frequency
-    for part in parts:
-        sample = float(part.times[1] - part.times[0])
-        length = max(WINDOW * period, SHORTEST * sample)
-        if part.times.size <= length / sample + 2:
-            continue
-        windows = Windows(part.times, length, POWER)
-        signals = _signals(part, float(np.linalg.norm(noise[:-1])), period)
-        by, rest = rows(signals, windows, chain, values)
-        still = np.column_stack([windows(column) for column in signals.resting.T])
-        slopes.append(by)
-        left.append(rest)
-        net.append(rest + by @ _without_offsets(values))
-        weights.append((np.maximum(still[:, :-1], still[:, 1:]) < MOSTLY).astype(float))
-        gain = windows.gain(2)
-    return _ChainRows(
-        np.concatenate(slopes),
-        np.concatenate(left),
-        np.concatenate(net),
-        np.concatenate(weights),
-        gain,
-    )
-
-
-def _signals(motion: FirstMotion, noise: float, period: float) -> ChainSignals:
-    """Return what the rows need."""
-    sample = float(motion.times[1] - motion.times[0])
-    angles = np.cumsum(motion.positions, axis=1)[:, :-1]
-    span = span_for(noise, sample, SMOOTHING * period)
-    return ChainSignals.of(motion.times, angles, motion.efforts, span)
+    values, period = parameters_of(arm), 2 * pi / arm.natural_mode().frequency
+    parts = windowed(motions, period, sample, noise)
+    whole = rows_of(parts, Chain.of(arm, friction), values)
+    gain = parts[-1].windows.gain(2) if parts else 0.0
+    by_noise = noise_of_rows(arm.inertia[:count, :count], noise, gain)
+    return _Told(whole, whole.left + whole.slopes @ _without_offsets(values), by_noise)
 
 
 def _without_offsets(values: FloatArray) -> FloatArray:
@@ -214,14 +131,6 @@ def _without_offsets(values: FloatArray) -> FloatArray:
     linear = values.reshape(len(KINDS), -1).copy()
     linear[OFFSET] = 0.0
     return linear.ravel()
-
-
-def _noise_of_rows(arm: PlanarArm, noise: FloatArray, gain: float) -> FloatArray:
-    """Return what noise of the angles does to the rows, shape (n-2,) [N m]."""
-    count = arm.n - 2
-    spread = np.sqrt(np.cumsum(noise[:count] ** 2))
-    result: FloatArray = gain * np.linalg.norm(arm.inertia[:count, :count] * spread, axis=1)
-    return result
 
 
 def _scales(arm: PlanarArm, motion: FirstMotion) -> FloatArray:

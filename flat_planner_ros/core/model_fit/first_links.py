@@ -160,6 +160,32 @@ def first_scales(arm: PlanarArm, effort: FloatArray, rate: FloatArray) -> FloatA
     return scales.ravel()
 
 
+def inertia_of(own: FloatArray, moment: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Return the inertia matrix of stretched first links, h_ij = l_i s_j, (m, m) [kg m^2]."""
+    coupling = np.triu(np.outer(lengths, moment), k=1)
+    result: FloatArray = np.diag(own) + coupling + coupling.T
+    return result
+
+
+def noise_of_rows(inertia: FloatArray, noise: FloatArray, gain: float) -> FloatArray:
+    """
+    Return what noise of the angles does to the rows, shape (m,) [N m].
+
+    Parameters
+    ----------
+    inertia
+        Of the first links, shape (m, m) [kg m^2].
+    noise
+        Standard deviation of each joint angle, shape (m and more,) [rad].
+    gain
+        Of a window for the second derivative, `Windows.gain` [1/s^2].
+
+    """
+    spread = np.sqrt(np.cumsum(noise[: len(inertia)] ** 2))
+    result: FloatArray = gain * np.linalg.norm(inertia * spread, axis=1)
+    return result
+
+
 def with_first_links(arm: PlanarArm, values: FloatArray) -> PlanarArm:
     """
     Return a copy with other first links; its lengths stay, masses grow where they must.
@@ -175,9 +201,8 @@ def with_first_links(arm: PlanarArm, values: FloatArray) -> PlanarArm:
     count = arm.n - 2
     own, moment, viscous, coulomb, _ = values.reshape(len(KINDS), count)
     lengths = Chain.of(arm, (0.0, 0.0)).lengths
-    coupling = np.triu(np.outer(lengths, moment), k=1)
     inertia, static_moment = arm.inertia.copy(), arm.static_moment.copy()
-    inertia[:count, :count] = np.diag(own) + coupling + coupling.T
+    inertia[:count, :count] = inertia_of(own, moment, lengths)
     static_moment[:count] = moment
     mass = arm.carried_mass.copy()
     mass[:count] = np.maximum(mass[:count], HEAVIER * moment**2 / own)

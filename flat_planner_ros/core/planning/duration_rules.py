@@ -210,8 +210,7 @@ class DurationRules:
         if duration <= shortest.duration:
             return shortest
         slower = plan_of(duration)
-        use = self.limits.worst(slower)
-        return shortest if use is not None and use.is_exceeded else slower
+        return shortest if self.limits.are_exceeded_by(slower) else slower
 
     def _likely(self, request: MotionRequest) -> float | None:
         """Return where the search for the shortest duration may start [s], None if unknown."""

@@ -220,6 +220,11 @@ class JointLimits:
         """
         return max(self.uses(plan), key=lambda use: use.ratio, default=None)
 
+    def are_exceeded_by(self, plan: Plan) -> bool:
+        """Tell whether a plan exceeds any limit at any time."""
+        use = self.worst(plan)
+        return use is not None and use.is_exceeded
+
     def at_ends(self, plan: Plan) -> LimitUse | None:
         """Return an effort beyond its limit at an end of a plan, which no duration changes."""
         for time in (0.0, plan.duration):

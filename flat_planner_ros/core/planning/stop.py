@@ -99,17 +99,11 @@ def stop_plan(
             shortest = middle
             continue
         demanding = (tried.peak_effort > effort).any() or (tried.peak_velocity > velocity).any()
-        if demanding or _exceeds(tried, limits):
+        if demanding or (limits is not None and limits.are_exceeded_by(tried)):
             shortest = middle
         else:
             best, longest = tried, middle
     return best
-
-
-def _exceeds(tried: Plan, limits: JointLimits | None) -> bool:
-    """Tell whether a stop goes beyond a limit."""
-    use = None if limits is None else limits.worst(tried)
-    return use is not None and use.is_exceeded
 
 
 def _stop(
