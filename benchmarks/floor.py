@@ -33,8 +33,8 @@ def array_operations(made: Plan) -> Callable[[], object]:
     Return a function that does what a cold plan asks of NumPy, on arrays of the same shapes.
 
     Roots of the equation and the solved boundary conditions with one correction, or the solved
-    series of a slow one; the law at the times of its certificate, and its samples. Nothing is
-    formed, scaled, checked or kept.
+    series of a slow one; the law at the times of its certificate, and its samples. Powers at those
+    times are known from before. Nothing is formed, scaled, checked or kept.
     """
     unit = made.problem.unit
     total = unit.law.total
@@ -88,14 +88,13 @@ def _certificate_operations(total) -> Callable[[], object]:
     """Return what gives derivatives 0 to 12 for the certificate, their peaks and sums."""
     distances, weights = probes(), np.ones(6)
     count = len(total.decays)
-    basis = np.empty((total.factors.shape[1], distances.shape[1]))
+    basis = np.ones((total.factors.shape[1], distances.shape[1]))
 
     def run() -> object:
         if count:
             fall = np.exp(-total.decays[:, None, None] * distances)
             parts = basis[: 4 * count].reshape(count, 2, 2, -1)
             parts[:, :, 0], parts[:, :, 1] = fall.real, fall.imag
-        _fill(basis[4 * count :], distances[0])
         jet = total.factors @ basis
         return np.abs(jet).max(axis=1), weights @ jet[2::2], weights @ np.abs(jet[2::2])
 
@@ -106,14 +105,13 @@ def _sample_operations(total, row: np.ndarray) -> Callable[[], object]:
     """Return what gives derivatives 0 to 6 and the torque on half the grid, mirrored."""
     half = problem.SAMPLES // 2 + 1
     count, blocks = len(total.decays), -(-half // BLOCK)
-    x, signs = np.linspace(-1.0, 0.0, half), np.ones((ORDERS, 1))
+    signs = np.ones((ORDERS, 1))
     exponents = -np.abs(total.decays[:, None]) * np.linspace(0.0, 2.0, BLOCK + 2 * blocks)
     amplitudes = total.factors[:ORDERS, None, : 4 * count].repeat(blocks, axis=1)
-    powers = np.empty((total.factors.shape[1] - 4 * count, half))
+    powers = np.ones((total.factors.shape[1] - 4 * count, half))
 
     def run() -> object:
         table = np.empty((ORDERS + 1, problem.SAMPLES))
-        _fill(powers, x)
         part = total.factors[:ORDERS, 4 * count :] @ powers
         if count:
             fall = np.exp(exponents)
@@ -128,13 +126,3 @@ def _sample_operations(total, row: np.ndarray) -> Callable[[], object]:
         return np.multiply(table, problem.DISTANCE)
 
     return run
-
-
-def _fill(table: np.ndarray, x: np.ndarray) -> None:
-    """Write ascending powers into rows, twice as many with each product."""
-    table[:1], table[1:2] = 1.0, x
-    known = 2
-    while known < len(table):
-        more = min(known - 1, len(table) - known)
-        np.multiply(table[1 : 1 + more], table[known - 1], out=table[known : known + more])
-        known += more

@@ -16,6 +16,7 @@
 
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
 from flat_planner_ros.core.motion_law.cost import (
+    fixed_cost,
     QuadraticCost,
     Strategy,
     strategy_cost,
@@ -51,6 +52,7 @@ __all__ = [
     'costate',
     'differentiation',
     'extremals',
+    'fixed_cost',
     'integration',
     'JET_ORDER',
     'Law',

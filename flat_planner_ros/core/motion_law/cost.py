@@ -257,12 +257,27 @@ def strategy_cost(
     for name, weight in (('r', r), ('p', p)):
         if not 0.0 <= weight <= MAX_ROOT:
             raise InvalidCost(f'weight {name} = {weight:g} is outside [0, {MAX_ROOT:g}]')
-    if strategy is Strategy.CUSTOM:
-        if custom is None:
-            raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')
-        return QuadraticCost(matrix=custom)
+    if not strategy.squares:
+        return fixed_cost(strategy, custom)
     matrix = np.zeros((ORDER, ORDER))
     for square in strategy.squares:
         matrix += square(flat_map, r, p)
     matrix[-1, -1] = 1.0
     return QuadraticCost(matrix=matrix, is_sum_of_squares=True)
+
+
+def fixed_cost(strategy: Strategy, custom: FloatArray | None = None) -> QuadraticCost:
+    """
+    Return the cost of a strategy without squares, which is the same for every arm.
+
+    Raises
+    ------
+    InvalidCost
+        An inadmissible Q, or none for the strategy `custom`.
+
+    """
+    if strategy is Strategy.CUSTOM:
+        if custom is None:
+            raise InvalidCost('strategy custom needs weights.Q, 36 numbers row by row')
+        return QuadraticCost(matrix=custom)
+    return QuadraticCost(matrix=np.diag(np.eye(ORDER)[-1]), is_sum_of_squares=True)

@@ -38,7 +38,7 @@ CHUNK = 32 * BLOCK
 """Times of an even grid evaluated together, few enough for the cache of the processor."""
 
 BLOCKS_KEPT = 4
-"""Blocks of even grids that are remembered."""
+"""Blocks of even grids, and tables of powers there, that are remembered."""
 
 BASES_KEPT = 8
 """Tables of exponentials and powers that are remembered: goals of one duration share them."""
@@ -137,8 +137,7 @@ class TermSum:
             tables = self._grid_tables(size, places) if count else None
             for start in range(0, half, CHUNK):
                 stop = min(start + CHUNK, half)
-                powers = np.empty((factors.shape[1] - 4 * count, stop - start))
-                _fill_powers(powers, x[start:stop])
+                powers = _grid_powers(factors.shape[1] - 4 * count, intervals, start)
                 part = factors[:, 4 * count :] @ powers
                 if tables is not None:
                     fine, coarse = tables
@@ -285,6 +284,8 @@ def _basis(
 ) -> FloatArray:
     """Return what the factors of plain sums multiply, as `plain_sums`, (..., terms, places)."""
     count, places = decays.shape[-1], distances.shape[1]
+    if count == 0 and powers is not None:
+        return powers[:terms]
     basis = np.empty((*decays.shape[:-1], terms, places))
     # Far from its end an exponential vanishes: this underflow is the right answer.
     with np.errstate(under='ignore'):
@@ -420,3 +421,12 @@ def grid_blocks(intervals: int) -> tuple[int, FloatArray, FloatArray]:
     index = np.concatenate([np.arange(size), first, intervals - size + 1 - first])
     x = np.arange(-float(intervals), 2.0 * half - intervals, 2.0) / intervals
     return (size, index * (2.0 / intervals), x)
+
+
+@lru_cache(maxsize=BLOCKS_KEPT)
+def _grid_powers(terms: int, intervals: int, start: int) -> FloatArray:
+    """Return 1, x, x^2, ... on the part of an even grid that is evaluated together."""
+    x = grid_blocks(intervals)[2][start : start + CHUNK]
+    powers = np.empty((terms, len(x)))
+    _fill_powers(powers, x)
+    return locked(powers)

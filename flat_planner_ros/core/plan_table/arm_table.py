@@ -25,7 +25,7 @@ from flat_planner_ros.core.arm import (
     PlanarArm,
 )
 from flat_planner_ros.core.insensitive import Oscillator, OscillatorTable
-from flat_planner_ros.core.motion_law import JET_ORDER, strategy_cost
+from flat_planner_ros.core.motion_law import JET_ORDER
 from flat_planner_ros.core.planning import joint_rows, PlanningOptions
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +94,7 @@ class ArmTable:
         for place, arm in enumerate(distinct):
             try:
                 mapping = flat_map(arm, options.flat_model)
-                r, p = options.weights(arm)
-                cost = strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
+                cost = options.cost(arm, mapping)
                 coefficients[place], rows[place] = cost.characteristic(), joint_rows(mapping)
                 oscillators.append(Oscillator.of(arm, options.drive))
             except FlatPlannerError as error:

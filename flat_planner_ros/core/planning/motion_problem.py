@@ -38,7 +38,6 @@ from flat_planner_ros.core.motion_law import (
     CONDITIONS,
     JET_ORDER,
     QuadraticCost,
-    strategy_cost,
     unit_motion,
     UnitMotion,
 )
@@ -208,8 +207,7 @@ def _equation(
 ) -> tuple[FlatMap, QuadraticCost, FloatArray]:
     """Return what no duration changes: flat map, cost and characteristic polynomial."""
     mapping = flat_map(arm, options.flat_model)
-    r, p = options.weights(arm)
-    cost = strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
+    cost = options.cost(arm, mapping)
     return mapping, cost, locked(cost.characteristic())
 
 

@@ -16,11 +16,13 @@
 
 from dataclasses import dataclass, field, KW_ONLY, replace
 from enum import Enum
+from functools import cached_property
 from math import isfinite
 
 from flat_planner_ros.core.arm import (
     checked_array,
     Drive,
+    FlatMap,
     FlatModel,
     FlatPlannerError,
     FloatArray,
@@ -29,7 +31,13 @@ from flat_planner_ros.core.arm import (
     PlanarArm,
 )
 from flat_planner_ros.core.insensitive import Insensitivity
-from flat_planner_ros.core.motion_law import CONDITIONS, Strategy
+from flat_planner_ros.core.motion_law import (
+    CONDITIONS,
+    fixed_cost,
+    QuadraticCost,
+    Strategy,
+    strategy_cost,
+)
 from flat_planner_ros.core.peak import PeakSettings
 from flat_planner_ros.core.planning.cost_weights import (
     check_one_form,
@@ -202,6 +210,26 @@ class PlanningOptions:
         return paper_weights(
             arm, effort=self.effort_weight, energy=self.energy_weight, r=self.r, p=self.p
         )
+
+    def cost(self, arm: PlanarArm, mapping: FlatMap) -> QuadraticCost:
+        """
+        Return what is minimised for a flat arm and its flat map.
+
+        Raises
+        ------
+        InvalidCost
+            The weights define no admissible cost.
+
+        """
+        if not self.strategy.squares:
+            return self._fixed_cost
+        r, p = self.weights(arm)
+        return strategy_cost(self.strategy, mapping, r=r, p=p)
+
+    @cached_property
+    def _fixed_cost(self) -> QuadraticCost:
+        """Cost of a strategy that weighs nothing of an arm, checked once for all arms."""
+        return fixed_cost(self.strategy, self.custom)
 
 
 class Reason(Enum):

@@ -45,7 +45,7 @@ from flat_planner_ros.core.insensitive import (
     insensitive_motion_from,
     InsensitiveMotion,
 )
-from flat_planner_ros.core.motion_law import Law, PathConditions, Strategy, strategy_cost
+from flat_planner_ros.core.motion_law import Law, PathConditions, Strategy
 from flat_planner_ros.core.peak import (
     check_peak,
     peak_motion,
@@ -332,6 +332,4 @@ def check_options(arm: PlanarArm, options: PlanningOptions) -> None:
     own = OWN_LAWS.get(options.strategy)
     if own is not None:
         own.check(arm, options)
-    mapping = flat_map(arm, options.flat_model)
-    r, p = options.weights(arm)
-    strategy_cost(options.strategy, mapping, r=r, p=p, custom=options.custom)
+    options.cost(arm, flat_map(arm, options.flat_model))

@@ -14,7 +14,7 @@
 
 """Weights without dimension: one motion for arms of any size; two forms, one value."""
 
-from flat_planner_ros.core.arm import InvalidCost, PlanarArm
+from flat_planner_ros.core.arm import flat_map, InvalidCost, PlanarArm
 from flat_planner_ros.core.planning import MotionRequest, plan, PlanningOptions, Strategy
 from flat_planner_ros.core.planning.cost_weights import MAX_RELATIVE_WEIGHT, MAX_WEIGHT
 import numpy as np
@@ -89,6 +89,21 @@ def test_a_weight_of_0_in_the_papers_form_leaves_it_to_the_other(paper_arm):
     assert PlanningOptions(**given, r=0.0, p=0.0).weights(paper_arm) == PlanningOptions(
         **given
     ).weights(paper_arm)
+
+
+def test_a_cost_without_weights_is_formed_once_for_all_arms(paper_arm):
+    arms = paper_arm, sized(paper_arm, mass=3.0, pace=0.5)
+    own = np.diag([1.0, 0.0, 2.0, 0.0, 0.0, 1.0])
+    for options, wanted in (
+        (PlanningOptions(strategy=Strategy.CUSTOM, custom=own), own),
+        (PlanningOptions(strategy=Strategy.POLYNOMIAL), np.diag([0.0] * 5 + [1.0])),
+    ):
+        first, second = (options.cost(arm, flat_map(arm)) for arm in arms)
+        assert first is second
+        np.testing.assert_array_equal(first.matrix, wanted)
+    weighted = PlanningOptions(strategy=Strategy.MIXED)
+    first, second = (weighted.cost(arm, flat_map(arm)).matrix for arm in arms)
+    assert not np.allclose(first, second)
 
 
 @pytest.mark.parametrize(
