@@ -155,6 +155,8 @@ class JointLimits:
             How far outside it may be [rad].
 
         """
+        if Quantity.POSITION not in self.quantities:
+            return self
         low, high = self.position_min, self.position_max
         if ((low <= positions) & (positions <= high)).all():
             return self
@@ -198,6 +200,8 @@ class JointLimits:
 
     def pose_violation(self, positions: FloatArray) -> LimitUse | None:
         """Return the first joint whose angle in a pose at rest is not allowed, None if all are."""
+        if Quantity.POSITION not in self.quantities:
+            return None
         for joint, position in enumerate(positions.tolist()):
             low, high = float(self.position_min[joint]), float(self.position_max[joint])
             for limit, excess in ((low, low - position), (high, position - high)):

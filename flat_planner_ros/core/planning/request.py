@@ -321,6 +321,6 @@ def planned_at_rest(angles: FloatArray) -> tuple[float, ...]:
 def _angles(name: str, values: FloatArray) -> FloatArray:
     """Return a locked copy of a finite vector."""
     angles = np.array(values, dtype=float)
-    if angles.ndim != 1 or not np.isfinite(angles).all():
+    if angles.ndim != 1 or not all(map(isfinite, angles.tolist())):
         raise InvalidRequest(f'{name} angles must be a finite vector, got {angles}')
     return locked(angles)

@@ -14,7 +14,7 @@
 
 """What looks like a mistake about a goal that breaks no rule: units, stamps, another start."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from math import tau
 
@@ -24,6 +24,7 @@ from flat_planner_ros.core.session.allowance import Allowance
 from flat_planner_ros.core.session.goal import Goal
 from flat_planner_ros.core.session.motion_start import MotionStart
 from flat_planner_ros.core.session.settings import SessionSettings
+from flat_planner_ros.core.session.timeline import Motion
 import numpy as np
 
 STEEP = 1.0 / 3.0
@@ -31,6 +32,35 @@ STEEP = 1.0 / 3.0
 
 ROUNDING = 1e-9
 """Part of a turn that does not count as more than one [-]."""
+
+
+def remarks_finder(
+    settings: SessionSettings,
+    goal: Goal,
+    start: MotionStart,
+    now: float,
+    hurry: tuple[str, ...],
+) -> Callable[[Motion], tuple[str, ...]]:
+    """
+    Return what tells all that is to be said of a motion, which its command need not wait for.
+
+    Parameters
+    ----------
+    settings, goal, start, now
+        As for `remarks_on`.
+    hurry
+        What `hurry_remarks` has found.
+
+    """
+    # Whoever keeps a motion does not keep the one before it.
+    start = start._replace(running=None)
+
+    def found(motion: Motion) -> tuple[str, ...]:
+        """Return the clauses."""
+        layers = layer_remarks(settings, motion.plan, motion.samples)
+        return (*remarks_on(settings, goal, start, now), *layers, *hurry)
+
+    return found
 
 
 def remarks_on(

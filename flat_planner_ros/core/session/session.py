@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 from flat_planner_ros.core.arm import FloatArray, JointSample
 from flat_planner_ros.core.planning import (
@@ -47,8 +48,7 @@ from flat_planner_ros.core.session.motion_start import (
 from flat_planner_ros.core.session.recent_states import RecentStates
 from flat_planner_ros.core.session.remarks import (
     hurry_remarks,
-    layer_remarks,
-    remarks_on,
+    remarks_finder,
     turns_remarks,
 )
 from flat_planner_ros.core.session.settings import SessionSettings, StartSource
@@ -207,18 +207,19 @@ class PlannerSession:
             turns = turns_remarks(settings, asked, start.pose)
             raise replace(error, message='; '.join([error.message, *turns])) from error
         is_gentle = duration is None and settings.duration_factor > 1.0
-        motion = self._motion_of(found, start, now)
-        layers = layer_remarks(settings, found, motion.samples)
         hurry = hurry_remarks(settings, allowance)
-        motion = replace(
-            motion,
+        motion = self._motion_of(
+            found,
+            start,
+            now,
             is_shortest=found.duration != duration and not (is_gentle or hurry),
             duration_factor=settings.duration_factor if is_gentle else 1.0,
             exceeded=exceeded,
-            remarks=(*remarks_on(settings, asked, start, now), *layers, *hurry),
+            find_remarks=remarks_finder(settings, asked, start, now, hurry),
         )
         motion = self._accepted(motion, start, goal.stamp, clock)
-        self._last_goal = replace(goal.without_start, stamp=None)
+        again = goal.without_start
+        self._last_goal = again if again.stamp is None else replace(again, stamp=None)
         return motion
 
     def settle(self, now: float, clock: Clock | None = None) -> Motion | None:
@@ -325,8 +326,8 @@ class PlannerSession:
         motion = self.under_way(now) or self._motion
         return None if motion is None else motion.reference(now)
 
-    def _motion_of(self, found: Plan, start: MotionStart, now: float) -> Motion:
-        """Return a plan with its place in time and the next number."""
+    def _motion_of(self, found: Plan, start: MotionStart, now: float, **known: Any) -> Motion:
+        """Return a plan with its place in time, the next number and what else is known of it."""
         wanted = self.settings.options.strategy
         return Motion(
             plan_id=self._count + 1,
@@ -336,6 +337,7 @@ class PlannerSession:
             planned_at=now,
             swing=None if start.swing is None else start.swing.amplitude,
             replaced_strategy=None if found.options.strategy is wanted else wanted,
+            **known,
         )
 
     def _accepted(

@@ -21,7 +21,7 @@ one until then is sent along with the new one: an executor that skips past point
 splice (docs/derivation.md, section S).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -63,8 +63,8 @@ class Motion:
         What the prescribed duration would have exceeded, if the motion was stretched.
     swing
         Amplitude of the measured swing that it starts from [rad]; None for another start.
-    remarks
-        Clauses on what looks like a mistake about the goal.
+    find_remarks
+        Tells the remarks on it; None where there are none.
     replaced_strategy
         The strategy that was asked for, where the plan had to take another one.
 
@@ -81,13 +81,18 @@ class Motion:
     exceeded: LimitUse | None = None
     swing: float | None = None
     replaced_strategy: Strategy | None = None
-    remarks: tuple[str, ...] = ()
+    find_remarks: 'Callable[[Motion], tuple[str, ...]] | None' = None
     duration_factor: float = 1.0
 
     @cached_property
     def end(self) -> float:
         """Return the absolute time from which it has no say [s]."""
         return self.start + self.plan.duration if self.cut is None else self.cut
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """Return clauses on what looks like a mistake about the goal."""
+        return () if self.find_remarks is None else self.find_remarks(self)
 
     def reference(self, now: float) -> PlanSamples:
         """Return what is planned at an absolute time, at rest before and after; one sample."""
@@ -235,6 +240,9 @@ class Timeline:
         """
         left = self.after(now).motions or self.motions[-1:]
         first = left[0]
+        if len(left) == 1 and now < first.start:
+            piece = Piece(first.samples, slice(None))
+            return Track(start=first.start, times=first.samples.times, pieces=(piece,))
         begun = int(first.samples.times.searchsorted(now - first.start, side='right')) - 1
         begun = max(begun, 0)
         # Later points stay on the old grid to the last bit: what is being played does not change.

@@ -25,9 +25,11 @@ from collections.abc import Sequence
 from functools import lru_cache
 import struct
 import sys
+from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import FloatArray, locked
 import numpy as np
+from numpy.typing import NDArray
 
 ARRAYS = 4
 """Positions, velocities, accelerations and efforts of a point."""
@@ -40,6 +42,12 @@ LARGEST = 8
 
 TYPES_KEPT = 32
 """Types of points that are remembered."""
+
+FORMS_KEPT = 4
+"""Trajectories that are remembered with all but their numbers: goals of one duration share one."""
+
+MOST_KEPT = 10_000
+"""Points of the longest trajectory that is remembered; with `FORMS_KEPT`, 5 MB for four joints."""
 
 LENGTH = struct.Struct('=I')
 """Number of entries of a sequence, or of characters with the zero at the end."""
@@ -76,11 +84,43 @@ def trajectory_bytes(
         left out at the end are empty.
 
     """
+    widths = [table.shape[1] for table in tables] + [0] * (ARRAYS - len(tables))
+    find = _kept_form if len(times) <= MOST_KEPT else _form
+    form = find(tuple(names), times.tobytes(), tuple(widths))
+    message = form.message.copy()
+    STAMP.pack_into(message.data, len(ENCAPSULATION), *stamp)
+    points = message[form.begin :].view(form.point)
+    for field, table in enumerate(tables):
+        if widths[field]:
+            points[f'values{field}'] = table
+    return message.tobytes()
+
+
+class _Form(NamedTuple):
+    """
+    A trajectory but for its stamp and the numbers of its points.
+
+    Attributes
+    ----------
+    message
+        All of it, with zeros for them, shape (bytes,).
+    begin, point
+        Where the points begin in it, all of one type.
+
+    """
+
+    message: NDArray[np.uint8]
+    begin: int
+    point: np.dtype
+
+
+def _form(names: tuple[str, ...], times_as_bytes: bytes, widths: tuple[int, ...]) -> _Form:
+    """Return the form of a trajectory; times as in `trajectory_bytes`."""
+    times = np.frombuffer(times_as_bytes)
     text = [LENGTH.pack(len(names)), *map(string_bytes, names), LENGTH.pack(len(times))]
-    front = b''.join([header_bytes(stamp), *text])
+    front = b''.join([header_bytes((0, 0)), *text])
     # Every point but the first begins where one ends, hence they are all aligned alike.
     body = len(front) - len(ENCAPSULATION)
-    widths = [table.shape[1] for table in tables] + [0] * (ARRAYS - len(tables))
     first = point_type(body, widths)
     other = point_type(body + first.itemsize, widths)
     # From its first numbers on the first point is as the others are: only the length before them
@@ -88,16 +128,18 @@ def trajectory_bytes(
     begin = len(front) + first.itemsize - other.itemsize
     message = np.zeros(begin + len(times) * other.itemsize, dtype=np.uint8)
     points = message[begin:].view(other)
-    for field, (width, table) in enumerate(zip(widths, tables, strict=False)):
+    for field, width in enumerate(widths):
         if width:
             points[f'length{field}'] = width
-            points[f'values{field}'] = table
     points['sec'], points['nanosec'] = np.divmod(
         np.rint(times * NANOSECONDS).astype(np.int64), NANOSECONDS
     )
     head = front + LENGTH.pack(widths[0]) + bytes(max(begin - len(front), 0))
     message[: len(head)] = np.frombuffer(head, dtype=np.uint8)
-    return message.tobytes()
+    return _Form(locked(message), begin, other)
+
+
+_kept_form = lru_cache(maxsize=FORMS_KEPT)(_form)
 
 
 def header_bytes(stamp: tuple[int, int]) -> bytes:

@@ -52,6 +52,16 @@ def test_the_middleware_reads_what_it_would_have_written(name, fields, points, c
     assert written[:4] == serialize_message(expected)[:4]
 
 
+def test_nothing_of_an_earlier_trajectory_is_left_in_one_of_the_same_form():
+    names, times = ['a', 'b'], np.array([0.0, 0.5, 1.0])
+    for number in range(3):
+        tables = [np.full((3, 2), number + 0.1 * field) for field in range(3)]
+        stamp = time_msg(1e8 * number + 0.3)
+        written = trajectory_bytes(names, (stamp.sec, stamp.nanosec), times, tables)
+        expected = message(names, stamp, times, tables)
+        assert deserialize_message(written, JointTrajectory) == expected
+
+
 def test_times_are_rounded_as_in_messages():
     times = np.array([0.0, 0.9999999994, 0.9999999996, 1.0000000005, 12345.678901234])
     written = trajectory_bytes(['a'], (0, 0), times, [])
