@@ -52,7 +52,8 @@ class BaseErrors(NamedTuple):
     nodes
         Times for each segment, infinite beyond those that it has, shape (segments, K) [s].
     roots
-        Their covariance is that times its transpose, shape (segments, K, K) [rad/s].
+        Their covariance is that times its transpose, zero beyond the nodes that a segment has,
+        shape (segments, K, K) [rad/s].
     spacing
         Of neighbouring nodes [s].
 
@@ -61,6 +62,17 @@ class BaseErrors(NamedTuple):
     nodes: FloatArray
     roots: FloatArray
     spacing: float
+
+    @classmethod
+    def none(cls, segments: int) -> 'BaseErrors':
+        """Return those of a velocity that is known, in so many segments."""
+        return cls(np.empty((segments, 0)), np.empty((segments, 0, 0)), 1.0)
+
+    @property
+    def counts(self) -> list[int]:
+        """Return how many nodes each segment has."""
+        found: list[int] = np.isfinite(self.nodes).sum(axis=1).tolist()
+        return found
 
     def of(self, block: slice) -> 'BaseErrors':
         """Return those of some of the segments."""
@@ -101,26 +113,23 @@ class Near(NamedTuple):
         found: FloatArray = np.einsum('gsn,sn->gs', self.shares, own)
         return found
 
-    def added(self, carried: FloatArray, begun: FloatArray, segment: int) -> FloatArray:
+    def add(self, found: FloatArray, carried: FloatArray, segment: int) -> None:
         """
-        Return derivatives by a state and by values at all nodes, shape (..., states + K).
+        Add to derivatives by the values at all nodes, shape (..., K), those at these nodes.
 
         Parameters
         ----------
+        found
+            To which is added.
         carried
-            By a state before these nodes act, and by the values at them, shape (..., states + n).
-        begun
-            Derivatives of that state, shape (states, states + K).
+            Derivatives by the values at these nodes, shape (..., n).
         segment
             Whose nodes they are.
 
         """
-        states = len(begun)
-        found: FloatArray = carried[..., :states] @ begun
-        place = states + int(self.first[segment])
-        room = found[..., place : place + self.shares.shape[-1]]
-        room += carried[..., states : states + room.shape[-1]]
-        return found
+        first = int(self.first[segment])
+        room = found[..., first : first + carried.shape[-1]]
+        room += carried[..., : room.shape[-1]]
 
 
 class Smoothing(NamedTuple):

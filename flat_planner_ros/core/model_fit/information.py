@@ -24,6 +24,7 @@ from flat_planner_ros.core.model_fit.last_links import (
     NAMES,
     STATES,
     step_for,
+    Steps,
     trajectories,
 )
 from flat_planner_ros.core.model_fit.measurements import Measurements
@@ -83,16 +84,17 @@ def foresee(
     model = vector_of(arm)[None]
     moved = np.zeros(times.size) if base is None else base
     period = float(times[1] - times[0])
-    longest = step_for(model[0], bool(model[0, COULOMB])) / refinement
+    has_friction = bool(model[0, COULOMB])
+    longest = step_for(model[0], has_friction) / refinement
     parts = int(np.ceil(period / longest))
     grid = times[0] + np.arange(2 * parts * (times.size - 1) + 1) * period / (2 * parts)
     forcing = Forcing(
-        step=period / parts,
         effort=np.interp(grid, times, effort)[:, None, None],
         variant=np.zeros(1, dtype=np.intp),
         base=np.interp(grid, times, moved)[:, None, None],
     )
-    states = trajectories(model, np.zeros((1, STATES, 1)), forcing)[::parts, 0, :, 0]
+    steps = Steps.of(model, period / parts, has_friction=has_friction)
+    states = trajectories(steps, np.zeros((1, STATES, 1)), forcing)[::parts, 0, :, 0]
     return ForeseenMotion(times=times, states=states, effort=effort)
 
 

@@ -70,8 +70,6 @@ class Forcing(NamedTuple):
 
     Attributes
     ----------
-    step
-        Time from one state to the next [s].
     effort
         Of joint n-1, for some models, shape (2 K + 1, variants, segments) [N m].
     variant
@@ -85,7 +83,6 @@ class Forcing(NamedTuple):
 
     """
 
-    step: float
     effort: FloatArray
     variant: npt.NDArray[np.intp]
     base: FloatArray
@@ -151,15 +148,47 @@ def step_for(parameters: FloatArray, has_friction: bool) -> float:
     return step
 
 
-def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> FloatArray:
+class Steps(NamedTuple):
+    """
+    How models are taken from one state to the next, whatever moves them.
+
+    Attributes
+    ----------
+    models
+        Parameters in the order of NAMES, and IMBALANCE if one is looked for, shape (P, 8 or 9);
+        offset and delay are not used: the former is added to what is seen, the latter is in the
+        forcing.
+    whole, on_last
+        Flow over a step under forces on link n-1, and on the last one.
+    stages
+        Of Coulomb friction in a step.
+    has_friction
+        Whether it acts.
+
+    """
+
+    models: FloatArray
+    whole: Flow
+    on_last: Flow
+    stages: Stages
+    has_friction: bool
+
+    @classmethod
+    def of(cls, models: FloatArray, step: float, *, has_friction: bool) -> 'Steps':
+        """Return steps of a length [s]."""
+        whole = linear_flow(models, step)
+        on_last = linear_flow(models, step, on_last=True)
+        return cls(models, whole, on_last, Stages.of(models, step, whole), has_friction)
+
+
+def trajectories(steps: Steps, starts: FloatArray, forcing: Forcing) -> FloatArray:
     """
     Return the motion of every model from every start.
 
     Parameters
     ----------
-    models
-        Parameters in the order of NAMES, shape (models, 8); offset and delay are not used: the
-        former is added to what is seen, the latter is in the forcing.
+    steps
+        Of the models.
     starts
         States at the first time, shape (models, 4, segments) [rad], [rad/s].
     forcing
@@ -171,17 +200,17 @@ def trajectories(models: FloatArray, starts: FloatArray, forcing: Forcing) -> Fl
         States, shape (K + 1, models, 4, segments).
 
     """
-    return motions(models, starts, forcing)[:, :, :STATES]
+    return motions(steps, starts, forcing)[:, :, :STATES]
 
 
-def motions(models: FloatArray, starts: FloatArray, forcing: Forcing) -> FloatArray:
+def motions(steps: Steps, starts: FloatArray, forcing: Forcing) -> FloatArray:
     """
     Return the same with the shares of Coulomb friction in the stages of each step behind it.
 
-    Shape (K + 1, models, 7, segments), or (K + 1, models, 4, segments) if no model has any; those
-    of the last state, from which no step is taken, mean nothing.
+    Shape (K + 1, models, 7, segments), or (K + 1, models, 4, segments) without; those of the last
+    state, from which no step is taken, mean nothing.
     """
-    whole = linear_flow(models, forcing.step)
+    models, whole = steps.models, steps.whole
     # Viscous friction of the link's own rate is in the transition; what the base adds is a force.
     drag = models[:, VISCOUS, None] * forcing.base
     forces = forcing.effort[:, forcing.variant] + drag
@@ -189,10 +218,9 @@ def motions(models: FloatArray, starts: FloatArray, forcing: Forcing) -> FloatAr
     if forcing.turning is not None:
         taken = models[:, IMBALANCE, None] * forcing.turning[:, :, None]
         forces = forces - taken[:, 0]
-        last = linear_flow(models, forcing.step, on_last=True)
-        turned = last.forced @ triples(-taken[:, 1])
-    if models[:, COULOMB].any():
-        return _with_friction(starts, forces, turned, models, forcing, whole)
+        turned = steps.on_last.forced @ triples(-taken[:, 1])
+    if steps.has_friction:
+        return _with_friction(starts, forces, turned, forcing.base, steps)
     pushed = whole.forced @ triples(forces)
     if turned is not None:
         pushed += turned
@@ -257,9 +285,8 @@ def _with_friction(
     starts: FloatArray,
     forces: FloatArray,
     turned: FloatArray | None,
-    models: FloatArray,
-    forcing: Forcing,
-    whole: Flow,
+    base: FloatArray,
+    steps: Steps,
 ) -> FloatArray:
     """
     Return the states one by one; velocities for Coulomb friction are predicted in stages.
@@ -268,13 +295,13 @@ def _with_friction(
     in its middle and at its end. One product takes it a step further, where the last three become
     what the velocities of link n-1 would be without the friction of that step.
     """
-    stages = Stages.of(models, forcing.step, whole)
+    models, whole, stages = steps.models, steps.whole, steps.stages
     step = np.concatenate(
         (whole.transition, -whole.forced * models[:, COULOMB, None, None]), axis=-1
     )
     flow = np.concatenate((step, stages.by_state @ step / COULOMB_VELOCITY), axis=1)
     rows = np.empty((len(forces) // 2 + 1, len(models), STATES + 3, starts.shape[-1]))
-    _force(rows, starts, forces, turned, forcing.base, stages, whole.forced)
+    _force(rows, starts, forces, turned, base, stages, whole.forced)
     before, carried = None, np.empty_like(rows[0])
     for row in rows:
         if before is not None:

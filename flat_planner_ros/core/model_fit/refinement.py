@@ -176,9 +176,9 @@ def linearised(
     sums, residuals, corrections = np.zeros((CHANNELS, lags)), [], []
     pieces = _segments(observed, model, starts, free, scales)
     for segment, start, piece in zip(observed.segments, starts, pieces, strict=True):
-        whole, whole_columns, correction = _projected(*piece, start[STATES:], spread)
+        whole, whole_columns, correction = _projected(piece, start[STATES:], spread)
         cost += float(whole @ whole)
-        shown = piece[0].size
+        shown = piece.misfit.size
         left, left_columns = whole[:shown], whole_columns[:shown]
         expected, by_expected = whole[shown:], whole_columns[shown:]
         # The base acts on link n-1.
@@ -192,7 +192,8 @@ def linearised(
             moves = observed.moves[segment.first : segment.last, channel]
             share = observed.rounding[channel] / spread[channel]
             rounding += share**2 * _alike(own, moves)
-        scores = (left[:, None] * left_columns).reshape(len(piece[0]), CHANNELS, count).sum(axis=1)
+        scored = left[:, None] * left_columns
+        scores = scored[::CHANNELS] + scored[1::CHANNELS]
         scatter += neighbours(scores, max(1, round(NEIGHBOURS * len(scores))))
         each = (left.reshape(-1, CHANNELS) * spread).astype(np.float32)
         sums += products(each.astype(float), lags)
@@ -211,30 +212,40 @@ def left_in(part: Observed, block: slice, found: Refined) -> Sequence[SingleOrDo
     return linearised(part, *point, keeps=True).residuals
 
 
+class _Piece(NamedTuple):
+    """Misfit of a segment (m, 2) [rad], and its derivatives as of `Shown`, by parameters."""
+
+    misfit: FloatArray
+    by_start: FloatArray
+    by_errors: FloatArray
+    by_parameter: FloatArray
+
+    def weighted(self, spread: FloatArray) -> Iterator[FloatArray]:
+        """Yield each in units of the spread, shape (2 m, columns)."""
+        for part in (self.misfit[..., None], *self[1:]):
+            yield (part / spread[:, None]).reshape(self.misfit.size, part.shape[-1])
+
+
 def _projected(
-    misfit: FloatArray,
-    by_own: FloatArray,
-    by_parameter: FloatArray,
-    errors: FloatArray,
-    spread: FloatArray,
+    piece: _Piece, errors: FloatArray, spread: FloatArray
 ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
     """Return weighted misfit and slopes without a segment's own unknowns, and their correction."""
-    size, own = misfit.size, by_own.shape[-1]
-    slopes = (by_own / spread[:, None]).reshape(size, own)
-    columns = (by_parameter / spread[:, None]).reshape(size, by_parameter.shape[-1])
-    whole = np.column_stack(((misfit / spread).ravel(), columns))
-    basis, triangle = np.linalg.qr(slopes[:, :STATES])
-    inside, crossed = basis.T @ whole, basis.T @ slopes[:, STATES:]
+    misfit, by_start, by_errors, by_parameter = piece.weighted(spread)
+    whole = np.hstack((misfit, by_parameter))
+    basis, triangle = np.linalg.qr(by_start)
+    inside, crossed = basis.T @ whole, basis.T @ by_errors
     whole -= basis @ inside
-    by_errors = slopes[:, STATES:] - basis @ crossed
+    by_errors = by_errors - basis @ crossed
     # What is expected of the base's errors counts as if each had been measured to be zero.
-    expected = np.zeros((own - STATES, whole.shape[1]))
-    expected[:, 0] = errors
-    normal = by_errors.T @ by_errors + np.eye(own - STATES)
+    nodes = by_errors.shape[1]
+    expected = np.zeros((nodes, whole.shape[1]))
+    expected[:, 0] = errors[:nodes]
+    normal = by_errors.T @ by_errors + np.eye(nodes)
     moved = -np.linalg.solve(normal, by_errors.T @ whole + expected)
     started = -np.linalg.solve(triangle, inside + crossed @ moved)
     left = np.vstack((whole + by_errors @ moved, expected + moved))
-    correction = np.vstack((started, moved))
+    correction = np.zeros((STATES + len(errors), whole.shape[1]))
+    correction[: STATES + nodes] = np.vstack((started, moved))
     return left[:, 0], left[:, 1:], (correction[:, 0], correction[:, 1:])
 
 
@@ -366,8 +377,8 @@ def _segments(
     starts: FloatArray,
     free: Sequence[int],
     scales: FloatArray,
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Yield for each segment misfit (m, 2) and its derivatives (m, 2, own) and (m, 2, free)."""
+) -> Iterator[_Piece]:
+    """Yield the misfit of each segment."""
     nudges = DIFFERENCE * scales[list(free)]
     models = np.tile(parameters, (1 + len(free), 1))
     models[1 + np.arange(len(free)), list(free)] += nudges
@@ -377,10 +388,14 @@ def _segments(
 
 def _of_block(
     observed: Observed, block: slice, models: FloatArray, starts: FloatArray, nudges: FloatArray
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+) -> Iterator[_Piece]:
     """Yield the same for the segments of a block, of which nothing stays behind."""
     seen = seen_with_slopes(observed, block, models, starts)
-    for segment, (angles, by_own) in zip(observed.segments[block], seen, strict=True):
-        by_parameter = (angles[..., 1:] - angles[..., :1]) / nudges
+    for segment, shown in zip(observed.segments[block], seen, strict=True):
         measured = observed.angles[segment.first : segment.last]
-        yield angles[..., 0] - measured, by_own, by_parameter
+        yield _Piece(
+            misfit=shown.angles - measured,
+            by_start=shown.by_start,
+            by_errors=shown.by_errors,
+            by_parameter=shown.by_model / nudges,
+        )

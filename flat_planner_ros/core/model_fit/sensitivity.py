@@ -13,81 +13,154 @@
 # limitations under the License.
 
 """
-How a motion depends on its start and on the velocity of the base.
+How a motion depends on its start, on the velocity of the base, and on the model.
 
-A step is linear in both but for Coulomb friction, whose slopes follow from the motion itself: one
-motion is simulated, and its derivatives are carried along with a matrix for each step, exact for
-the steps that are taken. What an unknown has done before some state acts through that state alone:
-its derivatives from there on are those by the state times what it has done.
+A step is linear in what goes into it but for Coulomb friction, whose slopes follow from the motion
+itself: one motion is simulated, and its derivatives are carried along with a matrix for each step,
+exact for the steps that are taken. What an unknown has done before some state acts through that
+state alone: its derivatives from there on are those by the state times what it has done.
 """
+
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import COULOMB_VELOCITY, FloatArray
 from flat_planner_ros.core.model_fit.last_links import (
     COULOMB,
-    linear_flow,
-    Stages,
+    Forcing,
+    IMBALANCE,
     STATES,
+    Steps,
     triples,
     VISCOUS,
 )
 import numpy as np
 
+BASE = STATES + 3
+"""End of the columns of a step's law for the state and for the velocity of the base."""
 
-def step_slopes(model: FloatArray, motion: FloatArray, step: float) -> FloatArray:
+EFFORT, SHARES = slice(BASE, BASE + 3), slice(BASE + 3, BASE + 6)
+"""Columns for the effort and for the shares of friction, in the stages of a step."""
+
+
+class StepLaw(NamedTuple):
     """
-    Return the derivatives of the states a step later, shape (K, segments, 4, 7).
+    What a step makes of what goes into it.
 
-    By the state before it, and by the velocity of the base at its start, middle and end.
+    The state a step later and the arguments of the shares of friction in its stages, by the state,
+    by the velocity of the base, by efforts, by these shares, and by what a coupling turns.
+
+    Attributes
+    ----------
+    law
+        Of a model, shape (7, 13), or (7, 19) with a coupling.
+    changes
+        Of this in models next to it, shape (models, 7, 13 or 19).
+
+    """
+
+    law: FloatArray
+    changes: FloatArray
+
+    @classmethod
+    def of(cls, steps: Steps) -> 'StepLaw':
+        """Return that of the first of some models and of those next to it."""
+        models, whole, stages = steps.models, steps.whole, steps.stages
+        by_state = np.hstack((whole.transition, stages.by_state / COULOMB_VELOCITY))
+        by_effort = np.hstack((whole.forced, stages.by_forces / COULOMB_VELOCITY))
+        by_base = models[:, VISCOUS, None, None] * by_effort
+        by_base[:, STATES:] -= np.eye(3) / COULOMB_VELOCITY
+        by_shares = np.zeros_like(by_effort)
+        by_shares[:, :STATES] = -models[:, COULOMB, None, None] * whole.forced
+        by_shares[:, 5, :1] = -stages.middle_by_first
+        by_shares[:, 6, :2] = -np.hstack((stages.last_by_first, stages.last_by_second))
+        parts = [by_state, by_base, by_effort, by_shares]
+        if models.shape[1] > IMBALANCE:
+            coupling = models[:, IMBALANCE, None, None]
+            by_turning = np.zeros_like(by_effort)
+            by_turning[:, :STATES] = -coupling * steps.on_last.forced
+            by_turning[:, -1] = by_turning[:, 2] / COULOMB_VELOCITY
+            parts += [-coupling * by_effort, by_turning]
+        laws = np.concatenate(parts, axis=-1)
+        return cls(laws[0], laws[1:] - laws[0])
+
+    def direct(self, motion: FloatArray, forcing: Forcing) -> FloatArray:
+        """Return derivatives with the shares of friction held, (K, 7, 7 + models, segments)."""
+        effort = triples(forcing.effort)[:, forcing.variant]
+        parts = [motion[:-1, :STATES], triples(forcing.base)[:, 0], effort[:, 0]]
+        parts.append(_shares(motion))
+        if forcing.turning is not None:
+            parts += list(triples(forcing.turning).swapaxes(0, 1))
+        inputs = np.concatenate(parts, axis=1)
+        steps, _, segments = inputs.shape
+        found = np.empty((steps, len(self.law), BASE + len(self.changes), segments))
+        found[:, :, :BASE] = self.law[:, :BASE, None]
+        by_model = self.changes.swapaxes(0, 1) @ inputs[:, None]
+        # Where a model differs in its delay, it meets another effort.
+        for place in np.flatnonzero(forcing.variant[1:] != forcing.variant[0]):
+            by_model[:, :, place] += self.law[:, EFFORT] @ (effort[:, 1 + place] - effort[:, 0])
+        found[:, :, BASE:] = by_model
+        return found
+
+
+def step_slopes(law: StepLaw, motion: FloatArray, forcing: Forcing) -> FloatArray:
+    """
+    Return the derivatives of the states a step later, shape (K, segments, 4, 7 + models).
+
+    By the state before it, by the velocity of the base at its start, middle and end, and along the
+    way to each of the models next to that which moves.
 
     Parameters
     ----------
-    model
-        Parameters in the order of `last_links.NAMES`, shape (1, 8).
+    law
+        Of a step.
     motion
         As `last_links.motions` returns it for the model, shape (K + 1, 4 or 7, segments).
-    step
-        Between its states [s].
+    forcing
+        What moves it, and the models next to it.
 
     """
-    whole = linear_flow(model, step)
-    pushed = model[0, VISCOUS] * whole.forced[0]
-    without = np.concatenate((whole.transition[0], pushed), axis=-1)
-    shares = motion[:-1, STATES:].swapaxes(0, 1)[..., None]
-    if not shares.size:
-        return np.broadcast_to(without, (len(motion) - 1, motion.shape[-1], *without.shape))
-    stages = Stages.of(model, step, whole)
-    by_base = model[0, VISCOUS] * stages.by_forces[0] - np.eye(3)
-    by_stage = np.concatenate((stages.by_state[0], by_base), axis=-1) / COULOMB_VELOCITY
-    first, middle, last = 1.0 - shares**2
-    by_first = first * by_stage[0]
-    by_middle = middle * (by_stage[1] - stages.middle_by_first * by_first)
-    earlier = stages.last_by_first * by_first + stages.last_by_second * by_middle
-    by_friction = np.stack((by_first, by_middle, last * (by_stage[2] - earlier)), axis=-2)
-    found: FloatArray = without - model[0, COULOMB] * whole.forced[0] @ by_friction
-    return found
+    direct = law.direct(motion, forcing)
+    flat = 1.0 - _shares(motion) ** 2
+    mixed = law.law[STATES:, SHARES]
+    by_friction = np.empty((len(flat), 3, *direct.shape[2:]))
+    for stage in range(3):
+        argument = direct[:, STATES + stage]
+        for before in range(stage):
+            argument = argument + mixed[stage, before] * by_friction[:, before]
+        np.multiply(flat[:, stage, None], argument, out=by_friction[:, stage])
+    count, _, *rest = by_friction.shape
+    by_stage = law.law[:STATES, SHARES] @ by_friction.reshape(count, 3, -1)
+    found = direct[:, :STATES] + by_stage.reshape(count, STATES, *rest)
+    return np.ascontiguousarray(found.transpose(0, 3, 1, 2))
 
 
-def carried_on(by_step: FloatArray, by_base: FloatArray | None) -> FloatArray:
+def _shares(motion: FloatArray) -> FloatArray:
+    """Return the shares of friction in all steps, shape (K, 3, segments)."""
+    found = motion[:-1, STATES:]
+    return found if found.size else np.zeros((len(found), 3, motion.shape[-1]))
+
+
+def carried_on(by_step: FloatArray, by_base: FloatArray) -> FloatArray:
     """
-    Return the derivatives of all states by the first one and by unknowns that act from there on.
+    Return the derivatives of all states by the first one, and by what acts from there on.
 
-    Shape (K + 1, segments, 4, 4 + unknowns).
+    Shape (K + 1, segments, 4, 4 + models + unknowns).
 
     Parameters
     ----------
     by_step
         As `step_slopes` returns it.
     by_base
-        Derivatives of the base's velocity by the unknowns on a grid of half steps, shape
-        (2 K + 1, segments, unknowns); None for no unknowns.
+        Derivatives of the base's velocity by unknowns on a grid of half steps, shape
+        (2 K + 1, segments, unknowns).
 
     """
     steps, segments = by_step.shape[:2]
-    unknowns = 0 if by_base is None else by_base.shape[-1]
-    found = np.zeros((steps + 1, segments, STATES, STATES + unknowns))
+    direct = STATES + by_step.shape[-1] - BASE
+    found = np.zeros((steps + 1, segments, STATES, direct + by_base.shape[-1]))
     found[0, ..., :STATES] = np.eye(STATES)
-    if by_base is not None:
-        np.matmul(by_step[..., STATES:], triples(by_base), out=found[1:, ..., STATES:])
+    found[1:, ..., STATES:direct] = by_step[..., BASE:]
+    np.matmul(by_step[..., STATES:BASE], triples(by_base), out=found[1:, ..., direct:])
     by_state = np.ascontiguousarray(by_step[..., :STATES])
     carried = np.empty_like(found[0])
     for matrices, before, after in zip(by_state, found[:-1], found[1:], strict=True):

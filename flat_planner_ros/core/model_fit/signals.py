@@ -87,30 +87,39 @@ def stretches(times: FloatArray, period: float) -> list[Segment]:
     return [Segment(*ends) for ends in pairwise([0, *gaps, times.size])]
 
 
-def between(times: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
+class Cubics(NamedTuple):
     """
-    Return samples interpolated by cubic Hermite polynomials with central slopes.
+    Samples interpolated by cubic Hermite polynomials with central slopes.
 
     Local and without the ringing of a spline where an effort jumps; the ends are held.
 
-    Parameters
+    Attributes
     ----------
-    times, values
-        Samples, shape (m,).
-    at
-        Times, any shape [s].
+    times, values, slopes
+        Shape (m,).
 
     """
-    inside = np.clip(at, times[0], times[-1])
-    # Slopes are needed next to the times only, and a recording may be long.
-    first = max(int(np.searchsorted(times, inside.min())) - 2, 0)
-    near = slice(first, int(np.searchsorted(times, inside.max())) + 3)
-    times, values = times[near], values[near]
-    index = np.clip(np.searchsorted(times, inside, side='right') - 1, 0, times.size - 2)
-    slopes = np.gradient(values, times)
-    step = times[index + 1] - times[index]
-    ends = values[index], values[index + 1], slopes[index], slopes[index + 1]
-    return hermite((inside - times[index]) / step, step, *ends)
+
+    times: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+
+    @classmethod
+    def of(cls, times: FloatArray, values: FloatArray, begin: float, end: float) -> 'Cubics':
+        """Return what is needed between two times [s]: a recording may be long."""
+        first = max(int(np.searchsorted(times, min(begin, times[-1]))) - 2, 0)
+        near = slice(first, int(np.searchsorted(times, max(end, times[0]))) + 3)
+        return cls(times[near], values[near], np.gradient(values[near], times[near]))
+
+    def __call__(self, at: FloatArray) -> FloatArray:
+        """Return values at times of any shape [s]."""
+        times, values, slopes = self
+        inside = np.clip(at, times[0], times[-1])
+        index = np.clip(np.searchsorted(times, inside, side='right') - 1, 0, times.size - 2)
+        here = times[index]
+        step = times[index + 1] - here
+        ends = values[index], values[index + 1], slopes[index], slopes[index + 1]
+        return hermite((inside - here) / step, step, *ends)
 
 
 def interpolated(
@@ -121,18 +130,25 @@ def interpolated(
 
     Parameters
     ----------
-    times, values, at
-        As for `between`.
+    times, values
+        Samples, shape (m,).
+    at
+        Times, any shape [s].
     straightness
         0 for the cubics, 1 for the lines [-].
 
     """
+    return between(Cubics.of(times, values, float(at.min()), float(at.max())), at, straightness)
+
+
+def between(cubics: Cubics, at: FloatArray, straightness: float) -> FloatArray:
+    """Return the same of samples whose slopes are known."""
     if straightness == 0.0:
-        return between(times, values, at)
-    straight = np.interp(at, times, values)
+        return cubics(at)
+    straight = np.interp(at, cubics.times, cubics.values)
     if straightness == 1.0:
         return straight
-    return straightness * straight + (1.0 - straightness) * between(times, values, at)
+    return straightness * straight + (1.0 - straightness) * cubics(at)
 
 
 def hermite(

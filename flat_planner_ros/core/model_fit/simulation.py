@@ -21,6 +21,7 @@ grows with neither.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import prod
 from typing import NamedTuple, TypeAlias
 
 from flat_planner_ros.core.arm import FloatArray
@@ -34,10 +35,10 @@ from flat_planner_ros.core.model_fit.last_links import (
     OFFSET,
     STATES,
     step_for,
-    trajectories,
+    Steps,
 )
-from flat_planner_ros.core.model_fit.sensitivity import carried_on, step_slopes
-from flat_planner_ros.core.model_fit.signals import between, hermite, interpolated, Segment
+from flat_planner_ros.core.model_fit.sensitivity import carried_on, step_slopes, StepLaw
+from flat_planner_ros.core.model_fit.signals import between, Cubics, hermite, Segment
 import numpy as np
 import numpy.typing as npt
 
@@ -136,80 +137,92 @@ def blocks(observed: Observed) -> Iterator[slice]:
         yield slice(first, first + BLOCK)
 
 
-def seen_of(
-    observed: Observed, block: slice, models: FloatArray, starts: FloatArray
-) -> list[FloatArray]:
+class Shown(NamedTuple):
     """
-    Return for each segment what the sensors would show of every model, (m, 2, models) [rad].
+    What the sensors would show of a model in a segment, and its derivatives.
 
-    Parameters
+    Attributes
     ----------
-    observed
-        What was measured; the velocity of its base counts as true.
-    block
-        The segments to simulate.
-    models
-        Parameters in the order of `last_links.NAMES`, shape (models, 8).
-    starts
-        Shape (models, 4, segments).
+    angles
+        Shape (m, 2) [rad].
+    by_start, by_errors
+        By the state at its start and by the errors of the base at the nodes that the segment has,
+        shapes (m, 2, 4) and (m, 2, nodes).
+    by_model
+        What models next to it change, to first order, shape (m, 2, models) [rad].
 
     """
-    samples = _Samples.of(observed, block)
-    seen = samples.empty(len(models))
-    for chunk in _chunks(observed, samples, models):
-        states = trajectories(models, starts, chunk.forcing)
-        starts = states[-1]
-        chunk.reading.fill(seen, states.transpose(0, 3, 2, 1))
-    seen[:, 1] += models[:, OFFSET]
-    return samples.split(seen)
+
+    angles: FloatArray
+    by_start: FloatArray
+    by_errors: FloatArray
+    by_model: FloatArray
 
 
 def seen_with_slopes(
     observed: Observed, block: slice, models: FloatArray, unknowns: FloatArray
-) -> list[tuple[FloatArray, FloatArray]]:
+) -> list[Shown]:
     """
-    Return the same, from one start, and the derivatives of the first model's by the unknowns.
+    Return for each segment what the sensors would show of the first model, and its derivatives.
 
     Parameters
     ----------
-    observed, block, models
-        As for `seen_of`.
+    observed
+        What was measured.
+    block
+        The segments to simulate.
+    models
+        Parameters in the order of `last_links.NAMES` of the one that is simulated, and of any next
+        to it, shape (1 + models, 8).
     unknowns
-        Start of each segment, and what the base is off, shape (segments, 4 or
-        `observed.unknowns`).
-
-    Returns
-    -------
-    list[tuple[FloatArray, FloatArray]]
-        Of each segment, shapes (m, 2, models) and (m, 2, unknowns).
+        Start of each segment, and what the base is off, shape (segments, `observed.unknowns`).
 
     """
-    samples = _Samples.of(observed, block)
-    own = unknowns.shape[1]
-    seen, slopes = samples.empty(len(models)), samples.empty(own)
-    errors = None if own == STATES or not observed.base_errors else observed.base_errors.of(block)
-    starts = np.broadcast_to(unknowns[:, :STATES].T, (len(models), STATES, len(unknowns)))
-    begun = [np.eye(STATES, own)] * len(unknowns)
-    off = None if errors is None else (errors.roots @ unknowns[:, STATES:, None])[..., 0]
-    for chunk in _chunks(observed, samples, models):
-        forcing, near = chunk.forcing, None
-        if errors is not None and off is not None:
-            near = errors.near(chunk.grid)
-            forcing = forcing._replace(base=forcing.base + near.between(off)[:, None, :])
-        motion = motions(models, starts, forcing)
-        by_step = step_slopes(models[:1], motion[:, 0], forcing.step)
-        carried = carried_on(by_step, None if near is None else near.shares)
+    samples, own = _Samples.of(observed, block), observed.base_errors
+    errors = BaseErrors.none(len(unknowns)) if own is None else own.of(block)
+    has_friction = bool(models[:, COULOMB].any())
+    step = step_for(models[0], has_friction) / observed.refinement
+    steps = Steps.of(models[:1], step, has_friction=has_friction)
+    law = StepLaw.of(Steps.of(models, step, has_friction=has_friction))
+    by_errors = STATES + len(law.changes)
+    seen = samples.empty(1)
+    slopes = samples.empty(by_errors + errors.nodes.shape[1])
+    starts = unknowns[:, :STATES].T[None]
+    begun = [np.eye(STATES, by_errors + count) for count in errors.counts]
+    off = (errors.roots @ unknowns[:, STATES:, None])[..., 0]
+    for chunk in _chunks(observed, samples, models, step):
+        near = errors.near(chunk.grid)
+        base = chunk.forcing.base + near.between(off)[:, None, :]
+        forcing = chunk.forcing._replace(base=base)
+        motion = motions(steps, starts, forcing._replace(variant=forcing.variant[:1]))
+        by_step = step_slopes(law, motion[:, 0], forcing)
+        carried = carried_on(by_step, near.shares)
         # A copy: what led to it need not stay.
         starts = motion[-1, :, :STATES].copy()
         chunk.reading.fill(seen, motion.transpose(0, 3, 2, 1)[:, :, :STATES])
         begun = chunk.reading.fill_from(slopes, carried, begun, near)
         del motion, by_step, carried
-    seen[:, 1] += models[:, OFFSET]
-    each = samples.split(slopes)
-    if errors is not None:
-        for by_own, root in zip(each, errors.roots, strict=True):
-            by_own[..., STATES:] = by_own[..., STATES:] @ root
-    return list(zip(samples.split(seen), each, strict=True))
+    seen[:, 1] += models[0, OFFSET]
+    slopes[:, 1, STATES:by_errors] += models[1:, OFFSET] - models[0, OFFSET]
+    each = zip(
+        samples.split(seen), samples.split(slopes), errors.roots, errors.counts, strict=True
+    )
+    return [
+        Shown(
+            angles=angles[..., 0],
+            by_start=by[..., :STATES],
+            by_errors=_product(by[..., by_errors : by_errors + count], root[:count, :count]),
+            by_model=by[..., STATES:by_errors],
+        )
+        for angles, by, root, count in each
+    ]
+
+
+def _product(rows: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return rows (..., a) times a matrix (a, b), as one product."""
+    *outer, inner = rows.shape
+    found: FloatArray = rows.reshape(prod(outer), inner) @ matrix
+    return found.reshape(*outer, matrix.shape[1])
 
 
 class _Reading(NamedTuple):
@@ -244,20 +257,26 @@ class _Reading(NamedTuple):
         seen[self.inside] = self.between(states)
 
     def fill_from(
-        self, slopes: FloatArray, carried: FloatArray, begun: list[FloatArray], near: Near | None
+        self, slopes: FloatArray, carried: FloatArray, begun: list[FloatArray], near: Near
     ) -> list[FloatArray]:
-        """Fill in derivatives by all unknowns; return those of the last state of each segment."""
+        """Fill in derivatives by all that acts; return those of the last state of each segment."""
         local, ends = self.between(carried), np.searchsorted(self.segment, range(len(begun) + 1))
         last = []
         for number, (before, own) in enumerate(zip(begun, carried[-1], strict=True)):
             place = slice(*ends[number : number + 2])
-            if near is None:
-                slopes[self.inside[place]] = local[place] @ before
-                last.append(own @ before)
-            else:
-                slopes[self.inside[place]] = near.added(local[place], before, number)
-                last.append(near.added(own, before, number))
+            columns = slice(before.shape[1])
+            slopes[self.inside[place], :, columns] = _joined(local[place], before, number, near)
+            last.append(_joined(own, before, number, near))
         return last
+
+
+def _joined(carried: FloatArray, begun: FloatArray, segment: int, near: Near) -> FloatArray:
+    """Return derivatives by all, of those by a state and by what acts since, and of that state."""
+    found = _product(carried[..., :STATES], begun)
+    since = carried.shape[-1] - near.shares.shape[-1]
+    found[..., STATES:since] += carried[..., STATES:since]
+    near.add(found[..., since:], carried[..., since:], segment)
+    return found
 
 
 class _Chunk(NamedTuple):
@@ -294,28 +313,71 @@ class _Samples(NamedTuple):
         return np.split(seen, np.searchsorted(self.segment, range(1, self.begins.size)))
 
 
-def _chunks(observed: Observed, samples: _Samples, models: FloatArray) -> Iterator[_Chunk]:
+def _chunks(
+    observed: Observed, samples: _Samples, models: FloatArray, step: float
+) -> Iterator[_Chunk]:
     """Yield the steps of a block of segments, so many at a time."""
-    step = step_for(models[0], bool(models[:, COULOMB].any())) / observed.refinement
     at = samples.elapsed / step
     steps = int(np.ceil(at.max())) + 1
+    ends = float(samples.begins.min()), float(samples.begins.max()) + steps * step
+    inputs = _Inputs.of(observed, models, *ends)
     for first in range(0, steps, CHUNK):
         last = min(first + CHUNK, steps)
         grid = samples.begins + np.arange(2 * first, 2 * last + 1)[:, None] * step / 2
         inside = np.flatnonzero((at >= first) & (at < last))
         node = at[inside].astype(int)
         reading = _Reading(inside, samples.segment[inside], node - first, at[inside] - node, step)
-        yield _Chunk(grid, _forcing(observed, models, grid, step), reading)
+        yield _Chunk(grid, inputs.at(grid), reading)
 
 
-def _forcing(observed: Observed, models: FloatArray, grid: FloatArray, step: float) -> Forcing:
-    """Return what moves the models; efforts come later by the delay."""
-    delays, variant = np.unique(models[:, DELAY], return_inverse=True)
-    shifted = grid[:, None, :] - delays[:, None]
-    effort = interpolated(observed.times, observed.effort, shifted, observed.straightness)
-    base = between(observed.times, observed.base, grid) if observed.base.any() else 0.0 * grid
-    turning = None
-    if observed.turning is not None and models.shape[1] > IMBALANCE:
-        each = [between(observed.times, column, grid) for column in observed.turning.T]
-        turning = np.stack(each, axis=1)
-    return Forcing(step, effort, variant, base[:, None, :], turning)
+class _Inputs(NamedTuple):
+    """
+    What moves models in a block of segments.
+
+    Attributes
+    ----------
+    effort, base, turning
+        Samples as of `Observed`, with their slopes; None and nothing for what is zero throughout.
+    straightness
+        Of the effort [-].
+    delays, variant
+        All different delays [s], and which of them each model has.
+
+    """
+
+    effort: Cubics
+    base: Cubics | None
+    turning: Sequence[Cubics]
+    straightness: float
+    delays: FloatArray
+    variant: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, observed: Observed, models: FloatArray, begin: float, end: float) -> '_Inputs':
+        """Return what moves models from one time to another [s]; efforts come by a delay later."""
+        delays, variant = np.unique(models[:, DELAY], return_inverse=True)
+        shifted = begin - float(delays[-1]), end - float(delays[0])
+        times = observed.times
+        turning = observed.turning if models.shape[1] > IMBALANCE else None
+        return cls(
+            effort=Cubics.of(times, observed.effort, *shifted),
+            base=Cubics.of(times, observed.base, begin, end) if observed.base.any() else None,
+            turning=[]
+            if turning is None
+            else [Cubics.of(times, column, begin, end) for column in turning.T],
+            straightness=observed.straightness,
+            delays=delays,
+            variant=variant,
+        )
+
+    def at(self, grid: FloatArray) -> Forcing:
+        """Return what moves them at times, shape (g, segments) [s]."""
+        shifted = grid[:, None, :] - self.delays[:, None]
+        base = 0.0 * grid if self.base is None else self.base(grid)
+        turning = [column(grid) for column in self.turning]
+        return Forcing(
+            effort=between(self.effort, shifted, self.straightness),
+            variant=self.variant,
+            base=base[:, None, :],
+            turning=np.stack(turning, axis=1) if turning else None,
+        )

@@ -21,15 +21,15 @@ for from several places, for one model.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.model_fit.last_links import STATES
-from flat_planner_ros.core.model_fit.refinement import DIFFERENCE
 from flat_planner_ros.core.model_fit.simulation import (
     blocks,
     first_starts,
     Observed,
-    seen_of,
+    seen_with_slopes,
 )
 import numpy as np
 
@@ -119,19 +119,16 @@ def _around(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return sums of squares (segments, places), and normal equations of the starts."""
     count = starts.shape[1]
-    nudges = np.vstack((np.zeros(STATES), DIFFERENCE * np.eye(STATES)))
-    begun = starts[:, :, None] + nudges
-    models = np.tile(model, (count * len(nudges), 1))
-    begun = begun.reshape(len(starts), -1, STATES).transpose(1, 2, 0)
-    seen = seen_of(observed, block, models, begun)
-    segments = observed.segments[block]
-    costs, slopes, gradients = np.empty(starts.shape[:2]), [], []
-    for number, (segment, angles) in enumerate(zip(segments, seen, strict=True)):
-        measured = observed.angles[segment.first : segment.last, :, None]
-        misfit = (angles - measured) / spread[:, None]
-        flat = misfit.reshape(-1, count, len(nudges)).transpose(1, 2, 0)
-        columns = (flat[:, 1:] - flat[:, :1]) / DIFFERENCE
-        costs[number] = (flat[:, 0] ** 2).sum(axis=-1)
-        slopes.append(columns @ columns.transpose(0, 2, 1))
-        gradients.append((columns @ flat[:, 0, :, None])[..., 0])
-    return costs, np.array(slopes), np.array(gradients)
+    segments = [segment for segment in observed.segments[block] for _ in range(count)]
+    beside = replace(observed, segments=segments, base_errors=None)
+    shown = seen_with_slopes(beside, slice(None), model[None], starts.reshape(-1, STATES))
+    costs, slopes, gradients = [], [], []
+    for segment, each in zip(segments, shown, strict=True):
+        measured = observed.angles[segment.first : segment.last]
+        misfit = ((each.angles - measured) / spread).ravel()
+        columns = (each.by_start / spread[:, None]).reshape(-1, STATES)
+        costs.append(misfit @ misfit)
+        slopes.append(columns.T @ columns)
+        gradients.append(columns.T @ misfit)
+    normal = np.reshape(slopes, (*starts.shape, STATES))
+    return np.reshape(costs, starts.shape[:2]), normal, np.reshape(gradients, starts.shape)

@@ -80,8 +80,8 @@ def test_what_nodes_did_before_acts_through_the_state():
     near = errors.near(np.array([[0.21], [0.25], [0.29]]))
     assert near.first.tolist() == [1]
     assert near.shares.shape == (3, 1, 2)
-    begun = np.arange(10.0).reshape(2, 5)
-    carried = np.arange(12.0).reshape(3, 4)
-    expected_of = carried[:, :2] @ begun
-    expected_of[:, 3:] += carried[:, 2:]
-    assert near.added(carried, begun, 0) == pytest.approx(expected_of)
+    found, carried = np.arange(9.0).reshape(3, 3), np.arange(6.0).reshape(3, 2)
+    expected_of = found.copy()
+    expected_of[:, 1:] += carried
+    near.add(found, carried, 0)
+    assert found == pytest.approx(expected_of)

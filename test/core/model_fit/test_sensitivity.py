@@ -31,7 +31,8 @@ def observed_arm():
     """Return two segments of an arm whose joint n-1 turns back several times in each."""
     times = np.arange(2 * SAMPLES) * 0.005
     nodes = np.array([[0.1, 0.2, 0.3, 0.9], [1.3, 1.4, 2.0, np.inf]])
-    rng = np.random.default_rng(1)
+    roots = 0.02 * np.random.default_rng(1).standard_normal((2, 4, 4))
+    roots[1, 3:] = roots[1, :, 3:] = 0.0
     return Observed(
         times=times,
         angles=np.zeros((times.size, 2)),
@@ -42,7 +43,7 @@ def observed_arm():
         moves=np.ones((times.size, 2), dtype=bool),
         rounding=np.zeros(2),
         segments=[Segment(0, SAMPLES), Segment(SAMPLES, 2 * SAMPLES)],
-        base_errors=BaseErrors(nodes, 0.02 * rng.standard_normal((2, 4, 4)), 0.1),
+        base_errors=BaseErrors(nodes, roots, 0.1),
     )
 
 
@@ -59,9 +60,44 @@ def test_slopes_are_those_of_difference_quotients(coulomb, has_errors):
     def played(changed):
         return seen_with_slopes(observed, slice(0, 2), model[None], changed)
 
+    shown = played(unknowns)
+    slopes = [np.concatenate((each.by_start, each.by_errors), axis=-1) for each in shown]
     for column, nudge in enumerate(NUDGE * np.eye(observed.unknowns)):
-        each = played(unknowns), played(unknowns + nudge), played(unknowns - nudge)
-        for (_, slopes), (above, _), (below, _) in zip(*each, strict=True):
-            expected = (above - below)[..., 0] / (2 * NUDGE)
+        each = slopes, played(unknowns + nudge), played(unknowns - nudge)
+        for own, above, below in zip(*each, strict=True):
+            expected = (above.angles - below.angles) / (2 * NUDGE)
             bound = 1e-5 * max(1e-3, np.abs(expected).max())
-            assert slopes[..., column] == pytest.approx(expected, abs=bound)
+            # Nodes that a segment has not do nothing.
+            found = own[..., column] if column < own.shape[-1] else 0.0
+            assert found == pytest.approx(expected, abs=bound)
+
+
+@pytest.mark.parametrize('coulomb', [0.0, 5e-4])
+@pytest.mark.parametrize('coupling', [None, 2e-6])
+def test_changes_of_the_model_are_those_of_other_models(coulomb, coupling):
+    observed = observed_arm()
+    model = MODEL.copy()
+    model[5] = coulomb
+    scales = np.abs(MODEL) + 1e-9
+    if coupling is not None:
+        turning = np.random.default_rng(3).uniform(-20.0, 20.0, (2 * SAMPLES, 2))
+        observed = replace(observed, turning=turning)
+        model, scales = np.append(model, coupling), np.append(scales, 1e-5)
+    unknowns = np.random.default_rng(2).uniform(-0.5, 0.5, (2, observed.unknowns))
+
+    def played(models):
+        return seen_with_slopes(observed, slice(0, 2), models, unknowns)
+
+    nudges = 1e-4 * np.diag(scales)
+    shown = played(np.vstack((model, model + nudges)))
+    for column, nudge in enumerate(nudges):
+        # The other row keeps Coulomb friction, and with it the steps, in both.
+        above, below = (
+            played(np.vstack((model + side * nudge, model + nudges[5]))) for side in (1.0, -1.0)
+        )
+        for each in zip(shown, above, below, strict=True):
+            own, more, less = each
+            expected = (more.angles - less.angles) / 2
+            bound = 1e-3 * np.abs(expected).max()
+            assert np.abs(expected).max() > 0.0
+            assert own.by_model[..., column] == pytest.approx(expected, abs=bound)
