@@ -49,7 +49,7 @@ PEER_BUDGET = 3.0
 """Time for the calls of one peer [s]; one call at least."""
 
 STEP = 1e-6
-"""Difference of two durations, so that no law is known from before [s]."""
+"""Difference of two durations [s] and stiffnesses [-], so that no law is known from before."""
 
 _CROWDED = np.outer([0.0, 49.0**2, 0.0, -98.0, 0.0, 1.0], [0.0, 49.0**2, 0.0, -98.0, 0.0, 1.0])
 
@@ -102,9 +102,15 @@ def answer(made: Plan) -> problem.Answer:
 
 
 def new_task() -> Task:
-    """Return a task that nothing can be known of: a new arm and a duration never asked for."""
-    number = next(_numbers)
-    return Task(problem.request(duration=problem.DURATION + STEP * number), problem.arm())
+    """Return a task that nothing can be known of: an arm and a duration never asked for."""
+    arm = problem.arm().scaled(stiffness=1.0 + STEP * next(_numbers))
+    return Task(new_duration().request, arm)
+
+
+def new_duration() -> Task:
+    """Return a task that differs from the last ones in its duration alone."""
+    duration = problem.DURATION + STEP * next(_numbers)
+    return Task(problem.request(duration=duration), _KNOWN_ARM)
 
 
 def new_distance() -> Task:
@@ -231,7 +237,8 @@ def _costs_section() -> Section:
 
         time = timing(step, new_task)
         bare, cold_bare = _floors(plan(problem.request(), _KNOWN_ARM, options), options)
-        times = (time.best, time.median, time.worst, cold_bare.best, bare.best)
+        known = timing(step, new_duration)
+        times = (time.best, time.median, time.worst, known.median, cold_bare.best, bare.best)
         ratios = (time.best / cold_bare.best, time.best / bare.best)
         rows.append((name, *map(duration_text, times), *(f'{ratio:.2f}' for ratio in ratios)))
     return Section(
@@ -241,6 +248,7 @@ def _costs_section() -> Section:
             'best',
             'median',
             'worst',
+            'another duration: median',
             'array operations after a plan',
             'in a row',
             'ratio of best',

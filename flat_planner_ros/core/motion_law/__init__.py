@@ -42,12 +42,15 @@ from flat_planner_ros.core.motion_law.law import (
 from flat_planner_ros.core.motion_law.legendre_series import differentiation, integration
 from flat_planner_ros.core.motion_law.optimal_path import optimal_path, PathConditions
 from flat_planner_ros.core.motion_law.path_cost import PathCost
+from flat_planner_ros.core.motion_law.roots import Cluster
 from flat_planner_ros.core.motion_law.simple_roots import characteristic_roots
+from flat_planner_ros.core.motion_law.spectra import known_spectrum
 from flat_planner_ros.core.motion_law.unit_table import unit_table, UnitGroup, UnitMotions
 
 __all__ = [
     'BoundaryConditions',
     'characteristic_roots',
+    'Cluster',
     'CONDITIONS',
     'costate',
     'differentiation',
@@ -55,6 +58,7 @@ __all__ = [
     'fixed_cost',
     'integration',
     'JET_ORDER',
+    'known_spectrum',
     'Law',
     'MAX_DERIVATIVE',
     'Mean',

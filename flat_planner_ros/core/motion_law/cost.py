@@ -22,7 +22,7 @@ J = integral of Y^T Q Y over the motion, Y = (y', y'', ..., y^(6)) and Q66 = 1
 from collections.abc import Callable
 from dataclasses import dataclass, InitVar
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 from flat_planner_ros.core.arm import FlatMap, FloatArray, InvalidCost, locked
@@ -98,16 +98,21 @@ class QuadraticCost:
         Returns
         -------
         FloatArray
-            Coefficients a_0 ... a_6 of sum a_k z^k, ascending, a_0 = 0 and a_6 = 1, shape (7,);
-            a_k multiplies y^(2k), unit s^(2k - 12).
+            Coefficients a_0 ... a_6 of sum a_k z^k, ascending, a_0 = 0 and a_6 = 1, shape (7,),
+            read-only; a_k multiplies y^(2k), unit s^(2k - 12).
 
         References
         ----------
         (21) of docs/derivation.md; `eq:ode` of the paper.
 
         """
+        return self._characteristic
+
+    @cached_property
+    def _characteristic(self) -> FloatArray:
+        """Sum the antidiagonals of Q once: plans of all durations ask for them."""
         coefficients: FloatArray = _antidiagonals() @ self.matrix.ravel()
-        return coefficients
+        return locked(coefficients)
 
 
 @cache

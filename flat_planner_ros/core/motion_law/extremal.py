@@ -28,7 +28,7 @@ are therefore certified once and kept: other distances, and other arms with the 
 multiples.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
@@ -37,7 +37,7 @@ from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS, SERIES_LENGTH
 from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, SummedLaw
-from flat_planner_ros.core.motion_law.roots import Spectrum
+from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
 from flat_planner_ros.core.motion_law.slow_law import SLOW, slow_law, speeds
 from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum, TermSum
 from flat_planner_ros.core.motion_law.terms import Term
@@ -64,6 +64,9 @@ UNITS_KEPT = 64
 """Unit motions in the cache; the one unused for longest makes room."""
 
 _ORDERS = np.arange(CONDITIONS + 1.0)
+
+Clusters = Callable[[], Sequence[Cluster]]
+"""Gives clusters of roots when they are asked for."""
 
 UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
 """Derivatives 0 to 5 of a unit motion at its ends, shape (6, 2) [-]."""
@@ -272,7 +275,7 @@ def rounded(coefficients: FloatArray) -> FloatArray:
     return result
 
 
-def unit_motion(coefficients: FloatArray) -> UnitMotion:
+def unit_motion(coefficients: FloatArray, clusters: Clusters | None = None) -> UnitMotion:
     """
     Return the unit motion of an equation, one that is known if its numbers are the same.
 
@@ -280,6 +283,8 @@ def unit_motion(coefficients: FloatArray) -> UnitMotion:
     ----------
     coefficients
         a_0 ... a_6 in normalised time, shape (7,) [-].
+    clusters
+        Gives the clusters of its roots, if they are needed; found from the coefficients if None.
 
     Raises
     ------
@@ -291,7 +296,7 @@ def unit_motion(coefficients: FloatArray) -> UnitMotion:
     for unit in kept:
         if (np.abs(unit.coefficients - coefficients) <= SAME * np.abs(coefficients)).all():
             return unit
-    unit = _certified(coefficients)
+    unit = _certified(coefficients, unit_law(coefficients, clusters))
     # In one step: threads that come together compute the same and one of them is kept.
     kept[:] = [unit]
     return unit
@@ -311,18 +316,19 @@ class UnitLaw(NamedTuple):
     rates: ComplexArray
 
 
-def unit_law(coefficients: FloatArray) -> UnitLaw:
+def unit_law(coefficients: FloatArray, clusters: Clusters | None = None) -> UnitLaw:
     """Return the stationary law of an equation over one unit of distance; it is odd."""
     fastest = float(speeds(coefficients))
     if fastest <= SLOW:
         return UnitLaw(slow_law(coefficients, fastest), np.array([complex(fastest)]))
-    solver = BoundarySolver(Spectrum(coefficients).clusters(), -1.0)
+    found = Spectrum(coefficients).clusters() if clusters is None else clusters()
+    solver = BoundarySolver(found, -1.0)
     return UnitLaw(solver.total(UNIT_ENDS[:, 1]), solver.rates)
 
 
-def _certified(coefficients: FloatArray) -> UnitMotion:
+def _certified(coefficients: FloatArray, found: UnitLaw) -> UnitMotion:
     """Return a unit motion with its residuals."""
-    total, rates = unit_law(coefficients)
+    total, rates = found
     law = SummedLaw(duration=2.0, total=total)
     jet = total.at(probes(), 2 * CONDITIONS, _powers_at_probes())
     peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)

@@ -107,9 +107,9 @@ class Spectrum:
 
     def groupings(self, scales: FloatArray) -> list[bytes]:
         """Return what is the same for all factors, (s,), that make the same clusters of roots."""
-        linked, apart = self._linked(scales[:, None, None]), scales > self._apart_beyond
-        pairs = zip(apart.tolist(), linked, strict=True)
-        return [APART if is_apart else link.tobytes() for is_apart, link in pairs]
+        near = scales <= self._apart_beyond
+        linked = iter(self._linked(scales[near, None, None]) if near.any() else ())
+        return [next(linked).tobytes() if is_near else APART for is_near in near.tolist()]
 
     def clusters(self, scale: float = 1.0) -> list[Cluster]:
         """Return the clusters of all roots multiplied by a positive factor."""

@@ -34,15 +34,13 @@ from flat_planner_ros.core.motion_law.basis import (
     Solutions,
 )
 from flat_planner_ros.core.motion_law.roots import Spectrum
+from flat_planner_ros.core.motion_law.spectra import known_spectrum
 from flat_planner_ros.core.motion_law.term_sum import Mixed, plain_factors, power_factors, TermSums
 from flat_planner_ros.core.motion_law.terms import leibniz, series_derivatives, TOP_ORDER, trimmed
 import numpy as np
 from numpy.typing import NDArray
 
 IntArray = NDArray[np.int_]
-
-SPECTRA_KEPT = 64
-"""Sets of roots that are remembered, one for each combination of arm and cost."""
 
 KINDS_KEPT = 256
 """Sets of solutions that are remembered: a few for each set of roots."""
@@ -122,7 +120,7 @@ def segment_bases(coefficients: FloatArray, scales: FloatArray) -> SegmentBases:
     octaves = np.rint(np.log2(scales) / OCTAVES).tolist()
     members: dict[tuple[bytes, float], list[int]] = {}
     for index, alike in enumerate(
-        zip(_spectrum(reference).groupings(scales), octaves, strict=True)
+        zip(known_spectrum(reference).groupings(scales), octaves, strict=True)
     ):
         members.setdefault(alike, []).append(index)
     places = np.empty((len(PLACES), len(scales), SOLUTIONS, SOLUTIONS))
@@ -135,12 +133,6 @@ def segment_bases(coefficients: FloatArray, scales: FloatArray) -> SegmentBases:
         rates[segments] = np.maximum(1.0, np.multiply.outer(ratios, kind.growths))
         groups.append(BasisGroup(kind, segments, ratios))
     return SegmentBases(tuple(groups), places, rates)
-
-
-@lru_cache(maxsize=SPECTRA_KEPT)
-def _spectrum(reference: bytes) -> Spectrum:
-    """Return the roots of an equation in its reference unit of time."""
-    return Spectrum(np.frombuffer(reference))
 
 
 class _Kind:
@@ -265,7 +257,7 @@ class _Kind:
 @lru_cache(maxsize=KINDS_KEPT)
 def known_kind(reference: bytes, grouping: bytes, octave: float) -> _Kind:
     """Return the solutions of an equation in the middle of some octaves of units of time."""
-    return _Kind(_spectrum(reference), grouping, 2.0 ** (OCTAVES * octave))
+    return _Kind(known_spectrum(reference), grouping, 2.0 ** (OCTAVES * octave))
 
 
 class _Powers:

@@ -35,8 +35,10 @@ from flat_planner_ros.core.arm import (
 )
 from flat_planner_ros.core.motion_law import (
     characteristic_roots,
+    Cluster,
     CONDITIONS,
     JET_ORDER,
+    known_spectrum,
     QuadraticCost,
     unit_motion,
     UnitMotion,
@@ -113,7 +115,7 @@ class MotionProblem:
     def _over_one(self) -> '_OverOne':
         """Solve the motion over 1 rad."""
         with strict_arithmetic():
-            unit = unit_motion(self.equation)
+            unit = unit_motion(self.equation, self._clusters)
             largest = float((self.rates * unit.peaks).max())
         # (35) with every derivative in units of the half duration.
         scale: float = (0.5 * float(self.duration)) ** (1.0 - 2.0 * CONDITIONS)
@@ -122,6 +124,11 @@ class MotionProblem:
         # Roots first: a cost of less than 1e-8 would take the quotient out of range.
         reach = min(MAX_NUMBER / largest, sqrt(MAX_NUMBER) / sqrt(cost)) if cost > 0.0 else 0.0
         return _OverOne(unit, cost, reach)
+
+    def _clusters(self) -> list[Cluster]:
+        """Return the clusters of the equation's roots, which are found once for all durations."""
+        spectrum = known_spectrum(self.cost.characteristic().tobytes())
+        return spectrum.clusters(0.5 * float(self.duration))
 
     @cached_property
     def roots(self) -> ComplexArray:
@@ -187,7 +194,7 @@ def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Mot
         The arm or the weights allow no plan.
 
     """
-    mapping, cost, characteristic = _equation(arm, options)
+    mapping, cost = _equation(arm, options)
     half = 0.5 * float(duration)
     powers = half**_ORDERS
     with strict_arithmetic():
@@ -196,19 +203,16 @@ def problem_of(arm: PlanarArm, options: PlanningOptions, duration: float) -> Mot
             duration=duration,
             cost=cost,
             flat_map=mapping,
-            equation=locked(characteristic * powers[::-1] ** 2),
+            equation=locked(cost.characteristic() * powers[::-1] ** 2),
             rates=locked(1.0 / powers),
         )
 
 
 @lru_cache(maxsize=EQUATIONS_KEPT)
-def _equation(
-    arm: PlanarArm, options: PlanningOptions
-) -> tuple[FlatMap, QuadraticCost, FloatArray]:
-    """Return what no duration changes: flat map, cost and characteristic polynomial."""
+def _equation(arm: PlanarArm, options: PlanningOptions) -> tuple[FlatMap, QuadraticCost]:
+    """Return what no duration changes: flat map and cost."""
     mapping = flat_map(arm, options.flat_model)
-    cost = options.cost(arm, mapping)
-    return mapping, cost, locked(cost.characteristic())
+    return mapping, options.cost(arm, mapping)
 
 
 def _grid(problem: MotionProblem, intervals: int) -> FloatArray:

@@ -23,12 +23,15 @@ from flat_planner_ros.core.motion_law.extremal import (
     BoundaryConditions,
     costate,
     extremals,
+    probes,
     stationarity_residual,
     UNIT_ENDS,
+    unit_law,
     unit_motion,
 )
 from flat_planner_ros.core.motion_law.roots import Spectrum
 from flat_planner_ros.core.motion_law.slow_law import SLOW, speeds
+from flat_planner_ros.core.motion_law.spectra import known_spectrum
 from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum
 import numpy as np
 from numpy.polynomial import legendre, Polynomial
@@ -413,6 +416,18 @@ def equation_of_speed(rng, speed):
     matrix[5, 5] = 1.0
     equation = QuadraticCost(matrix=matrix).characteristic()
     return equation * (speed / float(speeds(equation))) ** np.arange(12.0, -1.0, -2.0)
+
+
+@pytest.mark.parametrize('name', MATRICES)
+@pytest.mark.parametrize('half', [0.05, 0.7, 3.0])
+def test_roots_known_from_another_duration_give_the_same_unit_motion(name, half):
+    coefficients = QuadraticCost(matrix=MATRICES[name]).characteristic()
+    spectrum = known_spectrum(coefficients.tobytes())
+    equation = coefficients * half ** np.arange(12.0, -1.0, -2.0)
+    laws = unit_law(equation), unit_law(equation, lambda: spectrum.clusters(half))
+    anew, found = (law.total.at(probes(), 6) for law in laws)
+    peaks = np.abs(anew).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(found / peaks, anew / peaks, rtol=0.0, atol=1e-11)
 
 
 @pytest.mark.parametrize('speed', [0.01, 0.3, 1.0, 2.4, 2.6, 5.0, 8.9])

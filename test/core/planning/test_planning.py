@@ -264,7 +264,8 @@ def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
     # A problem that no other test has: nothing of it is in the cache.
     arm = paper_arm_with(2e-5)
 
-    def wrong(coefficients):
+    def wrong(coefficients, clusters):
+        del clusters
         if damage == 'middle':
             return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1])
         end = 0.5 * np.eye(6)[0]
