@@ -18,7 +18,8 @@ Goals of a planner in a process of its own, beside a plant and a monitor: how so
 Single goals from rest to rest, and goals streamed to a target that moves. Times are those of a
 client in another process: from its publishing the goal to its hearing the command and the verdict,
 both ways through the middleware. A node that answers with messages made beforehand, and works on
-nothing, shows what of it is the middleware's and the executor's (`bare_planner.py`).
+nothing, shows what of it is the middleware's and the executor's (`bare_planner.py`); the same node
+shows what it takes besides to read the goal and to make the messages of ready arrays.
 `python benchmarks/run.py goal_stream` runs this alone.
 """
 
@@ -34,7 +35,16 @@ from flat_planner_ros.ros.wire import interfaces, stamps
 from measurement import duration_text, Section, verdict
 import numpy as np
 import problem
-from processes import BARE_PLANNER, Listener, listener, NodeProcess, processes, SHIPPED
+from processes import (
+    AS_BYTES,
+    AS_MESSAGES,
+    BARE_PLANNER,
+    Listener,
+    listener,
+    NodeProcess,
+    processes,
+    SHIPPED,
+)
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -59,6 +69,14 @@ TARGETS = (
     ('verdict, median,', 1, 50.0, 2e-3),
 )
 """From a single goal to its command (0) or its verdict (1): percentile, target [s]."""
+
+NODES = {
+    '': 'planner',
+    ', a bare node': BARE_PLANNER,
+    ', one that makes messages': AS_MESSAGES,
+    ', one that makes bytes': AS_BYTES,
+}
+"""What answers single goals, by what is said of it."""
 
 RATES = (50.0, 200.0)
 """Of the streams [Hz]."""
@@ -208,22 +226,25 @@ def _single_delays(name: str, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _single_section(count: int) -> Section:
     """Measure goals that come while the arm rests."""
-    ours, bare = _single_delays('planner', count), _single_delays(BARE_PLANNER, count)
+    found = {label: _single_delays(name, count) for label, name in NODES.items()}
+    ours, bare, _, making = found.values()
     notes = []
     for name, index, share, target in TARGETS:
-        value, least = (float(np.percentile(delays[index], share)) for delays in (ours, bare))
+        value, least, made = (
+            float(np.percentile(delays[index], share)) for delays in (ours, bare, making)
+        )
         notes.append(
             f'{name} within {duration_text(target)} or {FLOOR:g} times the bare node: '
-            f'{verdict(value <= max(target, FLOOR * least))}, {value / least:.2f} times'
+            f'{verdict(value <= max(target, FLOOR * least))}, {value / least:.2f} times; '
+            f'{value / made:.2f} times the one that makes bytes'
         )
     return Section(
         f'Single goals, planner, plant and monitor at work, {POINTS} points',
         (f'from the goal to, {count} goals', 'median', 'p99', 'worst'),
         [
-            _delay_row('the command', ours[0]),
-            _delay_row('the command, a bare node', bare[0]),
-            _delay_row('the verdict', ours[1]),
-            _delay_row('the verdict, a bare node', bare[1]),
+            _delay_row(f'{what}{label}', delays[index])
+            for index, what in enumerate(('the command', 'the verdict'))
+            for label, delays in found.items()
         ],
         notes,
     )

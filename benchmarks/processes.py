@@ -47,8 +47,13 @@ BARE_ANSWER = '/bare/answer'
 BARE_PLANNER = 'bare planner'
 """Name of a node of rclpy that answers goals with messages made beforehand, `bare_planner.py`."""
 
-PROGRAMS = {BARE: 'bare_node.py', BARE_PLANNER: 'bare_planner.py'}
-"""Files of the nodes that are not the package's."""
+AS_MESSAGES, AS_BYTES = 'bare planner, messages', 'bare planner, bytes'
+"""Names of the same node that makes its answers of ready arrays for each goal."""
+
+PROGRAMS = {BARE: 'bare_node.py'} | dict.fromkeys(
+    (BARE_PLANNER, AS_MESSAGES, AS_BYTES), 'bare_planner.py'
+)
+"""Files of the nodes that are not the package's; each is told its name."""
 
 STAMP = struct.Struct('<iI')
 """Seconds and nanoseconds, behind the four bytes that start a serialised message."""
@@ -96,7 +101,7 @@ class NodeProcess:
         entry = f'from flat_planner_ros.programs import {name}_node as run'
         program = ['-c', f'{entry}; raise SystemExit(run())']
         if name in PROGRAMS:
-            program = [str(Path(__file__).parent / PROGRAMS[name])]
+            program = [str(Path(__file__).parent / PROGRAMS[name]), name]
         elif executor != SHIPPED:
             program = [str(Path(__file__).parent / 'spin_node.py'), name, executor]
         values = [f'{key}:={value}' for key, value in parameters.items()]
