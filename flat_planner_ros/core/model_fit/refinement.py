@@ -393,9 +393,5 @@ def _of_block(
     seen = seen_with_slopes(observed, block, models, starts)
     for segment, shown in zip(observed.segments[block], seen, strict=True):
         measured = observed.angles[segment.first : segment.last]
-        yield _Piece(
-            misfit=shown.angles - measured,
-            by_start=shown.by_start,
-            by_errors=shown.by_errors,
-            by_parameter=shown.by_model / nudges,
-        )
+        by_parameter = shown.by_model / nudges
+        yield _Piece(shown.angles - measured, shown.by_start, shown.by_errors, by_parameter)

@@ -161,9 +161,9 @@ class Shown(NamedTuple):
 
 def seen_with_slopes(
     observed: Observed, block: slice, models: FloatArray, unknowns: FloatArray
-) -> list[Shown]:
+) -> Iterator[Shown]:
     """
-    Return for each segment what the sensors would show of the first model, and its derivatives.
+    Yield for each segment what the sensors would show of the first model, and its derivatives.
 
     Parameters
     ----------
@@ -204,18 +204,14 @@ def seen_with_slopes(
         del motion, by_step, carried
     seen[:, 1] += models[0, OFFSET]
     slopes[:, 1, STATES:by_errors] += models[1:, OFFSET] - models[0, OFFSET]
-    each = zip(
-        samples.split(seen), samples.split(slopes), errors.roots, errors.counts, strict=True
-    )
-    return [
-        Shown(
+    shown = samples.split(seen), samples.split(slopes)
+    for angles, by, root, count in zip(*shown, errors.roots, errors.counts, strict=True):
+        yield Shown(
             angles=angles[..., 0],
             by_start=by[..., :STATES],
             by_errors=_product(by[..., by_errors : by_errors + count], root[:count, :count]),
             by_model=by[..., STATES:by_errors],
         )
-        for angles, by, root, count in each
-    ]
 
 
 def _product(rows: FloatArray, matrix: FloatArray) -> FloatArray:

@@ -113,9 +113,20 @@ class Windows:
 
     def __call__(self, signal: FloatArray, order: int = 0) -> FloatArray:
         """Return the means of a signal's derivative of some order, 0 to 2; shape (windows,)."""
-        weights = (-1) ** order * self._windows[order]
-        # A copy: what is between need not stay.
-        return np.correlate(signal, weights, mode='valid')[:: self._stride].copy()
+        stride, window = self._stride, (-1) ** order * self._windows[order]
+        count = max((signal.size - window.size) // stride + 1, 0)
+        # Neighbours are a stride apart: a stretch of one is weighted for all that it is in.
+        parts = -(-window.size // stride)
+        weights = np.zeros(parts * stride)
+        weights[: window.size] = window
+        samples = np.zeros((count + parts - 1) * stride)
+        seen = min(samples.size, signal.size)
+        samples[:seen] = signal[:seen]
+        weighted = weights.reshape(parts, stride) @ samples.reshape(-1, stride).T
+        found = np.zeros(count)
+        for place, part in enumerate(weighted):
+            found += part[place : place + count]
+        return found
 
     def pieces(self, count: int) -> Iterator[Segment]:
         """Yield pieces of so many samples whose windows, one after the other, are those of all."""

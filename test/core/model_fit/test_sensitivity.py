@@ -58,7 +58,7 @@ def test_slopes_are_those_of_difference_quotients(coulomb, has_errors):
     unknowns = np.random.default_rng(2).uniform(-0.5, 0.5, (2, observed.unknowns))
 
     def played(changed):
-        return seen_with_slopes(observed, slice(0, 2), model[None], changed)
+        return list(seen_with_slopes(observed, slice(0, 2), model[None], changed))
 
     shown = played(unknowns)
     slopes = [np.concatenate((each.by_start, each.by_errors), axis=-1) for each in shown]
@@ -86,7 +86,7 @@ def test_changes_of_the_model_are_those_of_other_models(coulomb, coupling):
     unknowns = np.random.default_rng(2).uniform(-0.5, 0.5, (2, observed.unknowns))
 
     def played(models):
-        return seen_with_slopes(observed, slice(0, 2), models, unknowns)
+        return list(seen_with_slopes(observed, slice(0, 2), models, unknowns))
 
     nudges = 1e-4 * np.diag(scales)
     shown = played(np.vstack((model, model + nudges)))

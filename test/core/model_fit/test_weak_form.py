@@ -21,6 +21,7 @@ from flat_planner_ros.core.model_fit.last_links import BOTH, COULOMB, DELAY, LAS
 from flat_planner_ros.core.model_fit.weak_form import (
     AT_A_TIME,
     LinkSignals,
+    OVERLAP,
     weak_guess,
     WINDOW,
     Windows,
@@ -37,6 +38,22 @@ ARM = PlanarArm.reduced(
     coulomb_friction=[5e-4],
 )
 PERIOD = 0.6
+
+
+@pytest.mark.parametrize('samples', [500, 497, 33, 32, 20])
+def test_windows_are_weighted_sums_around_every_few_samples(samples):
+    times, signal = 0.005 * np.arange(samples), np.random.default_rng(1).standard_normal(samples)
+    windows = Windows(times, 0.16)
+    half = 16
+    around = np.polynomial.Polynomial([1.0, 0.0, -1.0]) ** 4
+    places = np.arange(-half, half + 1) / half
+    firsts = range(0, samples - 2 * half, 2 * half // OVERLAP)
+    for order in range(3):
+        weights = (-1) ** order * around.deriv(order)(places) / (half * 0.005) ** order
+        weights /= around(places).sum()
+        expected = [weights @ signal[first : first + places.size] for first in firsts]
+        assert windows.samples == places.size
+        assert windows(signal, order) == pytest.approx(np.array(expected), rel=1e-9, abs=1e-9)
 
 
 def test_the_guess_is_that_of_all_rows_at_once():
