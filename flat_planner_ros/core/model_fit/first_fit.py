@@ -202,6 +202,8 @@ def _scales(parts: list[Windowed], start: PlanarArm) -> FloatArray:
 def _rows_around(parts: list[Windowed], chain: Chain, values: FloatArray) -> ChainRows:
     """Return the rows of all stretches, their weights those of what is left."""
     whole = rows_of(parts, chain, values)
+    if not len(whole.left):  # a recording shorter than a window
+        return whole
     spread = np.sqrt(np.average(whole.left**2, axis=0, weights=whole.weights + 1e-12))
     return whole._replace(weights=whole.weights / np.maximum(spread, 1e-300) ** 2)
 

@@ -163,6 +163,17 @@ def test_a_joint_that_never_moves_tells_nothing_of_itself():
             fit_model(replace(seen, positions=seen.positions * moves), believed)
 
 
+def test_a_recording_shorter_than_a_window_tells_nothing_of_the_first_links():
+    believed, true = arms(1, 0.0, seed=1)
+    seen = recorded(true, believed, noise=1e-4, until=1.6)
+    part = slice(20, 80)
+    short = Measurements(
+        times=seen.times[part], positions=seen.positions[part], efforts=seen.efforts[part]
+    )
+    found = first_estimates(fit_model(short, believed), true)
+    assert not any(estimate.is_told for estimate, _ in found.values())
+
+
 @pytest.mark.parametrize('noise', [0.0, 1e-5])
 def test_a_first_joint_that_is_held_fast_leaves_the_last_links_told(noise):
     """The arm beyond joint 1, recorded on its own, with an encoder that shows nothing."""
