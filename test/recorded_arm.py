@@ -27,7 +27,9 @@ GOALS = (pi, 0.0, 0.5 * pi, -0.5 * pi)
 """Four ordinary goals of joint n-1 [rad]; the joints before it go to a half and a third of it."""
 
 
-def commanded(arm, goals=GOALS, spacing=1.5, duration=1.0, period=0.005):
+def commanded(
+    arm, goals=GOALS, spacing=1.5, duration=1.0, period=0.005, strategy=Strategy.POLYNOMIAL
+):
     """Return the efforts that bring an arm from goal to goal, as one command."""
     shares = np.append(1.0 / np.arange(arm.n, 1, -1), 0.0)
     shares[-2] = 1.0
@@ -35,7 +37,7 @@ def commanded(arm, goals=GOALS, spacing=1.5, duration=1.0, period=0.005):
     for index, goal in enumerate(goals):
         there = goal * shares
         request = MotionRequest(start=here, final=there, duration=duration)
-        samples = plan(request, arm, PlanningOptions(strategy=Strategy.POLYNOMIAL)).sample(period)
+        samples = plan(request, arm, PlanningOptions(strategy=strategy)).sample(period)
         times.append(samples.times + index * spacing + 0.1)
         rows.append((samples.positions, samples.velocities, samples.efforts))
         here = there

@@ -14,6 +14,7 @@
 
 """The fit of the last two links: a guess, its refinement, what is told, and how well."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import pi, sqrt
@@ -82,6 +83,12 @@ HELD_TIMES = 4
 COVER = 2.0
 """Factor on what these times do to residuals: a slow drift of which one draw is seen [-]."""
 
+STICKING = (BOTH, COULOMB)
+"""What a small motion shows first: friction holds the arm where a model without would move it."""
+
+HOLDING = 0.5
+"""Friction that is tried for an arm that sticks, relative to the largest effort [-]."""
+
 GIVEN_UP_FIRST = (DELAY, COULOMB, VISCOUS, OFFSET, LAST, BOTH, DAMPING, STIFFNESS)
 """Of parameters that only together are told, the one that is kept at its start value."""
 
@@ -126,8 +133,8 @@ def fit_last_links(
     believed = vector_of(start)
     noise = np.maximum(noise_of_links(measurements), 1e-9)
     sharper = with_base_errors(observed, measurements, period)
-    guesses = _guesses(measurements, observed, period, believed)
-    found, scales = _first(observed, sharper, guesses, noise)
+    attempts = _attempts(measurements, observed, period, believed)
+    found, scales = _first(observed, sharper, attempts, noise)
     observed = sharper
     if observed.base_errors is not None:
         # Sharper than by what is left without these errors.
@@ -183,10 +190,22 @@ def _both(first: View, then: View, part: Observed) -> Observed:
     return then(first(part))
 
 
-def _guesses(
+class _Attempt(NamedTuple):
+    """A guess at the parameters, and those of them that are fitted before all are."""
+
+    guess: FloatArray
+    first: Sequence[int]
+
+
+def _attempts(
     measurements: Measurements, observed: Observed, period: float, believed: FloatArray
-) -> list[FloatArray]:
-    """Return weak form and belief, the better one first."""
+) -> list[_Attempt]:
+    """
+    Return weak form and belief, the better one first, and between them an arm that sticks.
+
+    Small motions of an arm with friction mislead the weak form, and friction that begins at zero
+    is taken for inertia.
+    """
     count = round(float(np.ptp(observed.times)) / measurements.period) + 1
     grid = Even(float(observed.times[0]), float(observed.times[-1]), count)
     rates = smoothed_rates(observed.times, observed.angles, period)
@@ -194,7 +213,10 @@ def _guesses(
     guesses = [point for point in (weak, believed) if np.isfinite(point).all()]
     scales, starts, ones = np.abs(believed) + 1e-9, first_starts(observed), np.ones(2)
     costs = [linearised(observed, p, starts, (), scales, ones).cost for p in guesses]
-    return [guesses[i] for i in np.argsort(costs)]
+    best, *others = [_Attempt(guesses[i], range(len(NAMES))) for i in np.argsort(costs)]
+    sticking = believed.copy()
+    sticking[COULOMB] = HOLDING * max(observed.effort.max(), -observed.effort.min())
+    return [best, _Attempt(sticking, STICKING), *others]
 
 
 def even_signals(
@@ -209,21 +231,20 @@ def even_signals(
 
 
 def _first(
-    observed: Observed, sharper: Observed, guesses: list[FloatArray], noise: FloatArray
+    observed: Observed, sharper: Observed, attempts: list[_Attempt], noise: FloatArray
 ) -> tuple[Refined, FloatArray]:
     """
-    Return the fit from the first guess that leaves little, else the best; and the scales.
+    Return the fit of the first attempt that leaves little, else the best; and the scales.
 
     What errors of the base explain, in a sharper view of the recording, is not left.
     """
     best, best_scales = None, np.empty(0)
-    coarse, every = replace(observed, refinement=COARSE), range(len(NAMES))
-    for guess in guesses:
-        scales = scales_of(observed, guess)
-        starts = settled(coarse, guess, noise)
-        found = refine(coarse, guess, every, scales, noise, starts, ROUGH)
-        starts = settled(coarse, found.parameters, found.spread, found.starts)
-        found = refine(coarse, found.parameters, every, scales, noise, starts, ROUGH)
+    for attempt in attempts:
+        scales = scales_of(observed, attempt.guess)
+        try:
+            found = _tried(replace(observed, refinement=COARSE), attempt, scales, noise)
+        except np.linalg.LinAlgError:  # it has run away
+            continue
         if best is None or found.around.cost < best.around.cost:
             best, best_scales = found, scales
         if (best.spread < LITTLE * noise).all() or _is_explained(sharper, best, noise):
@@ -231,6 +252,19 @@ def _first(
     if best is None:
         raise InvalidRequest('no guess at the model has a meaning')
     return best, best_scales
+
+
+def _tried(
+    observed: Observed, attempt: _Attempt, scales: FloatArray, noise: FloatArray
+) -> Refined:
+    """Return the rough fit that begins with a guess."""
+    # From little that is told a fit tries models that run away.
+    with np.errstate(over='ignore', invalid='ignore'):
+        starts = settled(observed, attempt.guess, noise)
+        found = refine(observed, attempt.guess, attempt.first, scales, noise, starts, ROUGH)
+        starts = settled(observed, found.parameters, found.spread, found.starts)
+        every = range(len(NAMES))
+        return refine(observed, found.parameters, every, scales, noise, starts, ROUGH)
 
 
 def _is_explained(sharper: Observed, found: Refined, noise: FloatArray) -> bool:
@@ -270,6 +304,8 @@ def _told(
         free.remove(given_up)
         parameters = found.parameters.copy()
         parameters[given_up] = believed[given_up]
+        if given_up == LAST:  # what shows are stiffness and damping relative to that inertia
+            parameters[[STIFFNESS, DAMPING]] *= believed[LAST] / found.parameters[LAST]
         if not parameters[BOTH] > parameters[LAST]:
             parameters[[BOTH, LAST]] = believed[[BOTH, LAST]]
         found = refine(observed, parameters, free, scales, found.spread, found.starts)

@@ -19,6 +19,7 @@ from math import pi
 
 from flat_planner_ros.core.arm import displaced_com, InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit import fit_model, Measurements, Trust
+from flat_planner_ros.core.motion_law import Strategy
 from free_arm import measured, pushes, simulated
 import numpy as np
 import pytest
@@ -85,6 +86,30 @@ def test_a_start_that_friction_hides_leads_nowhere_wrong():
     fit = fit_model(recorded(arm, arm, noise=1e-3, seed=8, **SHORT), arm)
     assert np.abs(z_scores(fit, arm)).max() < 4.0
     assert fit.misfit == ''
+
+
+@pytest.mark.parametrize(
+    'motion',
+    [
+        {
+            'goals': (0.3, 0.0),
+            'duration': 1.027,
+            'strategy': Strategy.MIN_CONTROL_EFFORT,
+            'spacing': 2.5,
+            'until': 5.2,
+            'seed': 1,
+        },
+        {'goals': (0.45, 0.0), 'duration': 1.5, 'spacing': 4.0, 'until': 8.2},
+    ],
+    ids=['weak form astray', 'ratios alone'],
+)
+def test_small_motions_that_stick_tell_friction_and_ratios(motion):
+    """The efforts are up to 1.1e-3 N m: the arm moves by 0.016 rad at most."""
+    sticky = replace(TRUE, coulomb_friction=[9e-4])
+    found = fit_model(recorded(sticky, BELIEVED, noise=1e-4, **motion), BELIEVED).arm
+    assert found.coulomb_friction[-1] == pytest.approx(9e-4, rel=0.01)
+    ratio = found.stiffness / found.inertia_star[-1]
+    assert ratio == pytest.approx(TRUE.stiffness / TRUE.inertia_star[-1], rel=0.01)
 
 
 def test_a_delay_and_an_offset_are_found():
