@@ -15,7 +15,7 @@
 """Which of several nodes that would move one arm lets go of it."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import inf
 from time import time_ns
 from typing import Any, NamedTuple
@@ -41,6 +41,15 @@ INTRODUCTION = 2.0
 
 PATIENCE = 5.0
 """Time for which a younger twin may go on sending efforts [s]."""
+
+
+UNNAMED = '_NODE_NAME_UNKNOWN_'
+"""What the graph calls a node whose publisher it has heard of before; one without ROS keeps it."""
+
+
+def are_twins(name: str, publishers: Iterable[str]) -> bool:
+    """Tell whether all nodes that publish are, or may turn out to be, of one name."""
+    return {name, UNNAMED}.issuperset(publishers)
 
 
 class Seniority(NamedTuple):
@@ -146,7 +155,7 @@ class RivalWatch:
         topic = self._own.topic
         if self._node.count_publishers(topic) > 1:
             infos = self._node.get_publishers_info_by_topic(topic)
-            self._are_twins = len({info.node_name for info in infos}) == 1
+            self._are_twins = are_twins(self._node.get_name(), (i.node_name for i in infos))
             if not self._listening:
                 self._listen(topic)
             self._introduce()
