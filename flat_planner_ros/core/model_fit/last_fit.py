@@ -239,10 +239,11 @@ def _first(
     What errors of the base explain, in a sharper view of the recording, is not left.
     """
     best, best_scales = None, np.empty(0)
+    coarse = replace(observed, refinement=COARSE)
     for attempt in attempts:
         scales = scales_of(observed, attempt.guess)
         try:
-            found = _tried(replace(observed, refinement=COARSE), attempt, scales, noise)
+            found = _tried(coarse, attempt, scales, noise)
         except np.linalg.LinAlgError:  # it has run away
             continue
         if best is None or found.around.cost < best.around.cost:

@@ -158,10 +158,6 @@ def _check_joints(goal: Goal, joints: Sequence[str]) -> None:
         missing = 'joint names' if not goal.joint_names else 'points'
         raise RequestRejected(Reason.EMPTY_GOAL, f'the goal has no {missing}')
     check_point_count(len(goal.points))
-    names = set(goal.joint_names)
-    is_each_once = len(names) == len(goal.joint_names)
-    if is_each_once and names.issuperset(joints[:-1]) and names.issubset(joints):
-        return
     known = ', '.join(joints)
     for name, count in Counter(goal.joint_names).items():
         if name not in joints:
