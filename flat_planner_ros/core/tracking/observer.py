@@ -30,6 +30,9 @@ POWERS = np.arange(TERMS)
 PERIODS = 4
 """Samples that come after so many periods still have a gain of their own."""
 
+LONGEST = 1000
+"""Periods over which one input is followed: an arm unseen for longer, no model knows any more."""
+
 ROUNDING = 1e-9
 """Share of a period that is no time [-]."""
 
@@ -131,7 +134,9 @@ class Observer:
         return self._moved(state, acting, until - now)
 
     def _moved(self, state: FloatArray, acting: FloatArray, time: float) -> FloatArray:
-        """Return what a state becomes of under one input."""
+        """Return what a state becomes of under one input, for a time of `LONGEST` at most."""
+        # A clock that was set forward asks for years.
+        time = min(time, LONGEST * self._period)
         whole = floor(time / self._period + ROUNDING) if self._columns else 0
         rest = time - whole * self._period
         for _ in range(whole):

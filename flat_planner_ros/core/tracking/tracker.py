@@ -82,7 +82,7 @@ class Tracker:
         self._observer = self._feedback.observer
         self._motion: TrackedMotion | None = None
         self._next: TrackedMotion | None = None
-        self._heard, self._sent = -inf, -inf
+        self._heard, self._sent, self._watched = -inf, -inf, -inf
         self._efforts = self._last = np.zeros(arm.n - 1)
         self._released = -inf
         self._clipped_since = inf
@@ -126,6 +126,7 @@ class Tracker:
         self._observer.continue_from(other._observer)
         self._motion, self._next, self.phase = other._motion, other._next, other.phase
         self._heard, self._sent, self._released = other._heard, other._sent, other._released
+        self._watched = other._watched
         self._efforts, self._last = other._efforts, other._last
         self._clipped_since, self.error = other._clipped_since, other.error
         self._fault, self.ages = other._fault, other.ages
@@ -181,6 +182,10 @@ class Tracker:
 
     def watch(self, now: float) -> FloatArray | None:
         """Return the efforts to apply if no sample has come lately, None if there are none."""
+        # Its own times are compared: those of samples may be another computer's.
+        if now < self._watched - self._settings.timeout:
+            self._go_back(now, f'the clock was set back by {self._watched - now:.3g} s')
+        self._watched = now
         if now - self._heard <= self._settings.timeout and self.phase is not Phase.RELEASING:
             return None
         return self._act(now)
@@ -209,7 +214,9 @@ class Tracker:
         limit, gap = self._settings.jump, sample.time - self._heard
         self._heard = sample.time
         if not 0.0 < gap <= self._settings.timeout:
-            if gap <= 0.0 or not self._waits(now):
+            if gap <= 0.0:
+                self._go_back(now, f'a joint sample is {-gap:.3g} s older than the last one')
+            elif not self._waits(now):
                 self._give_up(now, f'no joint sample for {gap:.3g} s')
             self._observer.restart(sample)
             return
@@ -293,8 +300,15 @@ class Tracker:
             self._observer.note(time, 0.0, np.zeros(self._joints - 2))
             self.phase = Phase.IDLE
             return
-        self._efforts = self._last * left / self._settings.ramp
+        self._efforts = self._last * min(1.0, left / self._settings.ramp)
         self._observer.note_efforts(time, self._efforts)
+
+    def _go_back(self, now: float, reason: str) -> None:
+        """Release the arm by a clock that was set back; efforts do not wait for its old times."""
+        self._give_up(now, reason)
+        self._sent = -inf
+        if now < self._released:
+            self._released, self._last = now, self._efforts
 
     def _give_up(self, now: float, reason: str) -> None:
         """Release the arm for a reason, if it is held."""

@@ -17,6 +17,7 @@
 from collections import deque
 from dataclasses import replace
 from math import tau
+import re
 
 from core.conftest import ARM
 from core.tracking.closed_loop import ClosedLoop, motion_of, samples_of
@@ -128,6 +129,25 @@ def test_the_effort_goes_to_zero_along_the_ramp(samples):
     times = np.array(loop.times[count:]) - loop.times[count - 1]
     expected = last[0] * np.maximum(0.0, 1.0 - times / 0.2)
     np.testing.assert_allclose(found, expected, atol=0.02 * abs(last[0]))
+
+
+@pytest.mark.parametrize('leap', [-10.0, -0.1, 0.5, 1e9])
+@pytest.mark.parametrize('is_heard', [True, False])
+def test_where_the_clock_is_set_the_effort_goes_to_zero_along_the_ramp(samples, leap, is_heard):
+    """By the new time, be joint samples heard in it or not."""
+    loop = moving(samples)
+    tracker, begin = loop.tracker, loop.arm.time
+    last, given = loop.acting, []
+    assert tracker.watch(begin) is None
+    for now in begin + leap + loop.period * np.arange(1.0, 76.0):
+        sample = JointSample(time=now, positions=loop.arm.position)
+        efforts = tracker.hear(sample, now) if is_heard else tracker.watch(now)
+        given.append(np.zeros(1) if efforts is None else efforts)
+    expected = last[0] * np.maximum(0.0, 1.0 - np.arange(75) * loop.period / SETTINGS.ramp)
+    np.testing.assert_allclose(np.array(given)[:, 0], expected, atol=0.05 * abs(last[0]))
+    assert tracker.phase is Phase.IDLE
+    assert re.search('sample|set back', tracker.take_fault())
+    assert tracker.take_fault() == ''
 
 
 def test_lasting_saturation_ends_the_motion(samples):

@@ -191,6 +191,16 @@ def test_a_joint_state_that_is_not_finite_ends_the_motion(arm):
     arm.assert_obeys()
 
 
+def test_a_clock_that_is_set_back_ends_the_motion(graph):
+    arm = Arm(graph, is_simulated=True)
+    arm.start()
+    arm.command()
+    arm.move_into()
+    arm.time -= 5.0
+    arm.assert_let_go('the clock was set back by', is_silent=True)
+    arm.assert_obeys()
+
+
 def test_an_effort_that_stays_at_its_limit_ends_the_motion(graph):
     arm, limit = Arm(graph, is_simulated=True), 1e-6
     arm.start(**{'limits.effort': [limit], 'saturation_timeout': 0.2})
