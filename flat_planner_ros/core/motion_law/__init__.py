@@ -15,6 +15,7 @@
 """Motion laws: the planned function of time that a quadratic cost makes optimal."""
 
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
+from flat_planner_ros.core.motion_law.certificate import probes
 from flat_planner_ros.core.motion_law.cost import (
     fixed_cost,
     QuadraticCost,
@@ -26,7 +27,6 @@ from flat_planner_ros.core.motion_law.extremal import (
     costate,
     extremals,
     Mean,
-    probes,
     stationarity_residual,
     unit_motion,
     UnitMotion,

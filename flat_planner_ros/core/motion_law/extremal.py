@@ -36,18 +36,26 @@ from typing import NamedTuple
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS, SERIES_LENGTH
 from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
+from flat_planner_ros.core.motion_law.certificate import (
+    boundary_residual,
+    peaks_of,
+    probes,
+    relative_sum,
+    UNIT_ENDS,
+)
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, SummedLaw
 from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
-from flat_planner_ros.core.motion_law.slow_law import SLOW, slow_law, speeds
-from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum, TermSum
+from flat_planner_ros.core.motion_law.series_basis import (
+    FASTEST,
+    probed,
+    solved,
+    speeds,
+    terms_for,
+)
+from flat_planner_ros.core.motion_law.series_sum import SeriesSum
+from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
-
-PROBES = 8
-"""Evenly spaced times of half a motion at which a law is certified, besides those near the end."""
-
-PROBE_DEPTH = 36
-"""Halvings of the distance to the start at which a law is certified."""
 
 KEY_BITS = 48
 """
@@ -67,9 +75,6 @@ _ORDERS = np.arange(CONDITIONS + 1.0)
 
 Clusters = Callable[[], Sequence[Cluster]]
 """Gives clusters of roots when they are asked for."""
-
-UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
-"""Derivatives 0 to 5 of a unit motion at its ends, shape (6, 2) [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,9 +156,7 @@ def stationarity_residual(coefficients: FloatArray, jet: FloatArray) -> float:
         magnitudes [-].
 
     """
-    weights, even = coefficients[1:], jet[2::2]
-    size = float((np.abs(weights) @ np.abs(even)).max())
-    return float(np.abs(weights @ even).max()) / size if size > 0.0 else 0.0
+    return float(relative_sum(coefficients[1:], jet[2::2]))
 
 
 def costate(coefficients: FloatArray, jet: FloatArray) -> FloatArray:
@@ -296,7 +299,11 @@ def unit_motion(coefficients: FloatArray, clusters: Clusters | None = None) -> U
     for unit in kept:
         if (np.abs(unit.coefficients - coefficients) <= SAME * np.abs(coefficients)).all():
             return unit
-    unit = _certified(coefficients, unit_law(coefficients, clusters))
+    fastest = float(speeds(coefficients))
+    if fastest <= FASTEST:
+        unit = _as_series(coefficients, fastest)
+    else:
+        unit = by_roots(coefficients, clusters)
     # In one step: threads that come together compute the same and one of them is kept.
     kept[:] = [unit]
     return unit
@@ -309,55 +316,40 @@ def kept_units(key: bytes) -> list[UnitMotion]:
     return []
 
 
-class UnitLaw(NamedTuple):
-    """A law from rest at -1/2 to rest at 1/2, and its rates as those of a `UnitMotion`."""
-
-    total: TermSum
-    rates: ComplexArray
-
-
-def unit_law(coefficients: FloatArray, clusters: Clusters | None = None) -> UnitLaw:
-    """Return the stationary law of an equation over one unit of distance; it is odd."""
-    fastest = float(speeds(coefficients))
-    if fastest <= SLOW:
-        return UnitLaw(slow_law(coefficients, fastest), np.array([complex(fastest)]))
-    found = Spectrum(coefficients).clusters() if clusters is None else clusters()
-    solver = BoundarySolver(found, -1.0)
-    return UnitLaw(solver.total(UNIT_ENDS[:, 1]), solver.rates)
-
-
-def _certified(coefficients: FloatArray, found: UnitLaw) -> UnitMotion:
-    """Return a unit motion with its residuals."""
-    total, rates = found
-    law = SummedLaw(duration=2.0, total=total)
-    jet = total.at(probes(), 2 * CONDITIONS, _powers_at_probes())
-    peaks = np.abs(jet[: JET_ORDER + 1]).max(axis=1)
-    # Relative to the start, as the value's own peak is the distance.
-    sizes = peaks[:CONDITIONS] + UNIT_ENDS[:, 1]
-    last = jet.shape[1] - 1
-    miss = np.abs(jet[:CONDITIONS, ::last] - UNIT_ENDS) / sizes[:, None]  # first and last
+def _as_series(coefficients: FloatArray, speed: float) -> UnitMotion:
+    """Return the unit motion of an equation that is slow enough for a series."""
+    terms = terms_for(speed)
+    amplitudes, cost = solved(coefficients, terms)
+    total = SeriesSum(coefficients=coefficients, amplitudes=amplitudes)
+    jet, parts = probed(amplitudes)
+    peaks = peaks_of(jet)
     return UnitMotion(
         coefficients=coefficients,
-        law=law,
-        rates=rates,
-        boundary_residual=float(miss.max()),
-        optimality_residual=stationarity_residual(coefficients, jet) + SAME,
-        costate=float(costate(coefficients, jet[:, -2])),
+        law=SummedLaw(duration=2.0, total=total),
+        rates=np.array([complex(speed)]),
+        boundary_residual=float(boundary_residual(jet, peaks)),
+        optimality_residual=float(relative_sum(coefficients, parts)) + SAME,
+        costate=float(cost),
         peaks=peaks,
     )
 
 
-@cache
-def probes() -> FloatArray:
-    """
-    Return x + 1 and 1 - x at times that crowd towards the start as fast as boundary layers can.
-
-    They run from 0 to 1, as one half of a motion has enough; the last one is the end, 2.
-    """
-    layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
-    times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
-    times = np.append(times, 2.0)
-    return np.array([times, 2.0 - times])
+def by_roots(coefficients: FloatArray, clusters: Clusters | None = None) -> UnitMotion:
+    """Return the unit motion of an equation as a sum of exponentials, as `unit_motion`."""
+    found = Spectrum(coefficients).clusters() if clusters is None else clusters()
+    solver = BoundarySolver(found, -1.0)
+    total = solver.total(UNIT_ENDS[:, 1])
+    jet = total.at(probes(), 2 * CONDITIONS, _powers_at_probes())
+    peaks = peaks_of(jet)
+    return UnitMotion(
+        coefficients=coefficients,
+        law=SummedLaw(duration=2.0, total=total),
+        rates=solver.rates,
+        boundary_residual=float(boundary_residual(jet, peaks)),
+        optimality_residual=stationarity_residual(coefficients, jet) + SAME,
+        costate=float(costate(coefficients, jet[:, -2])),
+        peaks=peaks,
+    )
 
 
 @cache

@@ -29,7 +29,6 @@ from math import ceil, log2
 from typing import Protocol, TYPE_CHECKING
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
-from flat_planner_ros.core.motion_law.term_sum import TermSum
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -142,10 +141,30 @@ class ScaledLaw(ABC):
         return replace(self, factor=factor * self.factor, offset=offset + factor * self.offset)
 
 
+class Sum(Protocol):
+    """A function of normalised time that is a sum: of terms with roots, or of a series."""
+
+    def at(self, distances: FloatArray, order: int, /) -> FloatArray:
+        """Return the sum and its derivatives in x, as `ScaledLaw.normalised_jet`."""
+
+    def fill_odd_grid(self, table: FloatArray, scales: FloatArray, /) -> None:
+        """
+        Write an odd sum and its derivatives in x at even times, both ends included.
+
+        Parameters
+        ----------
+        table
+            Its rows take the derivatives in ascending order, shape (orders, m), m > 1.
+        scales
+            Factors of the derivatives, shape (orders,).
+
+        """
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SummedLaw(ScaledLaw):
     """
-    A sum of exponentials times polynomials, infinitely smooth; up to the order `TOP_ORDER`.
+    A solution of the Euler-Lagrange equation, infinitely smooth; up to the order `TOP_ORDER`.
 
     Attributes
     ----------
@@ -154,7 +173,7 @@ class SummedLaw(ScaledLaw):
 
     """
 
-    total: TermSum
+    total: Sum
 
     def normalised_jet(self, distances: FloatArray, order: int) -> FloatArray:
         """Return the sum of the terms and its derivatives, as `ScaledLaw.normalised_jet`."""

@@ -27,7 +27,8 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
-from flat_planner_ros.core.motion_law.extremal import Mean, probes, UNIT_ENDS
+from flat_planner_ros.core.motion_law.certificate import probes, UNIT_ENDS
+from flat_planner_ros.core.motion_law.extremal import Mean
 from flat_planner_ros.core.motion_law.law import gauss_panel, JET_ORDER
 from flat_planner_ros.core.motion_law.octaves import octaves, octaves_for
 from flat_planner_ros.core.motion_law.simple_roots import SimpleRoots

@@ -25,9 +25,14 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
-from flat_planner_ros.core.motion_law.extremal import SAME, UNIT_ENDS
+from flat_planner_ros.core.motion_law.certificate import (
+    boundary_residual,
+    peaks_of,
+    relative_sum,
+)
+from flat_planner_ros.core.motion_law.extremal import SAME
 from flat_planner_ros.core.motion_law.law import JET_ORDER
-from flat_planner_ros.core.motion_law.slow_law import speeds
+from flat_planner_ros.core.motion_law.series_basis import speeds
 import numpy as np
 from numpy.typing import NDArray
 
@@ -107,19 +112,11 @@ class Certificates:
             Derivatives 0 to 12 at `probes`, shape (p, 13, m).
 
         """
-        peaks = np.abs(jets[:, : JET_ORDER + 1]).max(axis=2)
-        # Relative to the start, as the value's own peak is the distance.
-        sizes = peaks[:, :CONDITIONS] + UNIT_ENDS[:, 1]
-        miss = np.abs(jets[:, :CONDITIONS, [0, -1]] - UNIT_ENDS) / sizes[..., None]
-        even = jets[:, 2::2]
-        factors = coefficients[:, None, 1:]
-        terms = (np.abs(factors) @ np.abs(even)).max(axis=(1, 2))
-        # Of the polynomial law no term is left at all.
-        stationarity = np.abs(factors @ even).max(axis=(1, 2)) / np.where(terms > 0.0, terms, 1.0)
+        peaks = peaks_of(jets)
         return cls(
             coefficients=coefficients,
-            boundary_residual=miss.max(axis=(1, 2)),
-            optimality_residual=stationarity + SAME,
+            boundary_residual=boundary_residual(jets, peaks),
+            optimality_residual=relative_sum(coefficients[:, 1:], jets[:, 2::2]) + SAME,
             costate=-np.einsum('pk,pk->p', coefficients[:, 1:], jets[:, 1:SOLUTIONS:2, -2]),
             peaks=peaks,
             ends=jets[:, CONDITIONS:SOLUTIONS, -1].copy(),

@@ -15,8 +15,7 @@
 """
 Unit motions of many equations at once, as Legendre series.
 
-They are combinations of the laws of `series_basis`. Roots that are too fast for the terms do not
-pass the certificate, and are left to exponentials.
+They are combinations of the laws of `series_basis`, whatever their roots have in common.
 """
 
 from collections.abc import Iterator
@@ -24,11 +23,23 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
-from flat_planner_ros.core.motion_law.basis import SOLUTIONS
-from flat_planner_ros.core.motion_law.extremal import Mean, probes
+from flat_planner_ros.core.motion_law.basis import CONDITIONS
+from flat_planner_ros.core.motion_law.certificate import (
+    boundary_residual,
+    peaks_of,
+    relative_sum,
+)
+from flat_planner_ros.core.motion_law.extremal import Mean, SAME
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER
-from flat_planner_ros.core.motion_law.legendre_series import legendre_values
-from flat_planner_ros.core.motion_law.series_basis import series_basis
+from flat_planner_ros.core.motion_law.legendre_series import differentiation, legendre_values
+from flat_planner_ros.core.motion_law.series_basis import (
+    continued,
+    LOW_DEGREES,
+    probed,
+    series_basis,
+    solved,
+    TERMS,
+)
 from flat_planner_ros.core.motion_law.unit_motions import (
     by_parts,
     Certificates,
@@ -40,9 +51,6 @@ from flat_planner_ros.core.motion_law.unit_motions import (
 )
 import numpy as np
 
-FASTEST = {0: 0.0, 10: 3.0, 16: 10.0, 24: 20.0, 32: 28.0}
-"""Fastest root in units of 2 / duration for each number of odd terms of w^(12) [-]."""
-
 TABLES_KEPT = 32
 """Tables of basis functions at certain places that are remembered."""
 
@@ -50,7 +58,7 @@ TABLES_KEPT = 32
 @lru_cache(maxsize=TABLES_KEPT)
 def _halves(terms: int) -> tuple[FloatArray, FloatArray]:
     """Return derivatives 0, 2, 4, 6 and 1, 3, 5 of the basis, (terms + 1, orders size / 2)."""
-    derivatives = series_basis(terms).derivatives[: JET_ORDER + 1]
+    derivatives = series_basis(terms).derivatives[JET_ORDER:]
     # Those of even order are odd about the middle.
     odd, even = derivatives[::2, 1::2], derivatives[1::2, ::2]
     return _in_columns(odd), _in_columns(even)
@@ -62,35 +70,52 @@ def _in_columns(part: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=TABLES_KEPT)
-def _at_probes(terms: int) -> FloatArray:
-    """Return derivatives 0 to 12 of the basis at the times of the certificate."""
-    after_start, before_end = probes()
-    places = np.where(after_start < 1.0, after_start - 1.0, 1.0 - before_end)
+def _at_end(terms: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return what the derivatives beyond the sixth of a basis follow from at the end.
+
+    Returns
+    -------
+    tuple[FloatArray, FloatArray, FloatArray]
+        Its orders -6 to 6 at x = 1, shape (terms + 1, 13); the Legendre coefficients of its even
+        orders at `LOW_DEGREES`, shape (terms + 1, 7 * 3); derivatives 0 to 6 of these polynomials,
+        shape (3, 7).
+
+    """
     derivatives = series_basis(terms).derivatives
-    values = legendre_values(places, derivatives.shape[1])
-    table = np.einsum('kst,sm->tkm', derivatives, values)
-    return locked(table.reshape(terms + 1, -1))
+    low = derivatives[::2, LOW_DEGREES].transpose(2, 0, 1).reshape(terms + 1, -1)
+    slope, jets = differentiation(CONDITIONS), [np.eye(CONDITIONS)[LOW_DEGREES]]
+    for _ in range(JET_ORDER):
+        jets.append(jets[-1] @ slope.T)
+    # P_n(1) = 1.
+    ends = np.array(jets).sum(axis=2).T
+    return locked(derivatives.sum(axis=1).T.copy()), locked(low.copy()), locked(ends)
 
 
 @lru_cache(maxsize=TABLES_KEPT)
 def _at_nodes(terms: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return weights of a quadrature, odd and even Legendre polynomials there, (size / 2, m)."""
-    times, weights = half_quadrature(np.array([complex(FASTEST[terms])]))
-    return locked(weights), *_parities(times - 1.0, 2 * terms + SOLUTIONS)
+    times, weights = half_quadrature(np.array([complex(TERMS[terms])]))
+    return locked(weights), *_parities(times - 1.0, _size(terms))
 
 
 @lru_cache(maxsize=TABLES_KEPT)
 def _on_grid(terms: int, intervals: int) -> tuple[FloatArray, FloatArray]:
     """Return the same at the first half of even times, the middle included."""
     places = 2.0 * np.arange(intervals // 2 + 1.0) / intervals - 1.0
-    return _parities(places, 2 * terms + SOLUTIONS)
+    return _parities(places, _size(terms))
 
 
 @lru_cache(maxsize=TABLES_KEPT)
 def _velocities(terms: int, intervals: int) -> FloatArray:
     """Return w' of the basis at x = 0, h, ..., 1, shape (terms + 1, intervals + 1)."""
-    values = legendre_values(np.linspace(0.0, 1.0, intervals + 1), 2 * terms + SOLUTIONS)
-    return locked(series_basis(terms).derivatives[1].T @ values)
+    values = legendre_values(np.linspace(0.0, 1.0, intervals + 1), _size(terms))
+    return locked(series_basis(terms).derivatives[JET_ORDER + 1].T @ values)
+
+
+def _size(terms: int) -> int:
+    """Return how many Legendre polynomials a basis consists of."""
+    return int(series_basis(terms).derivatives.shape[1])
 
 
 def _parities(places: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
@@ -126,7 +151,7 @@ class UnitSeries:
         coefficients
             a_0 ... a_6 in normalised time, shape (p, 7) [-].
         terms
-            How many terms a law has, one of `FASTEST`.
+            How many terms a law has, one of `TERMS`.
 
         Raises
         ------
@@ -134,11 +159,18 @@ class UnitSeries:
             An equation is singular in double precision.
 
         """
-        system = np.einsum('pk,kij->pij', coefficients, series_basis(terms).equation)
-        changes = np.linalg.solve(system[..., :terms], -system[..., terms:])[..., 0]
-        amplitudes = np.concatenate([changes, np.ones((len(changes), 1))], axis=1)
-        jets = (amplitudes @ _at_probes(terms)).reshape(len(changes), SOLUTIONS + 1, -1)
-        return cls(amplitudes=amplitudes, certificates=Certificates.of(coefficients, jets))
+        amplitudes, cost = solved(coefficients, terms)
+        jets, parts = probed(amplitudes)
+        peaks = peaks_of(jets)
+        certificates = Certificates(
+            coefficients=coefficients,
+            boundary_residual=boundary_residual(jets, peaks),
+            optimality_residual=relative_sum(coefficients, parts) + SAME,
+            costate=cost,
+            peaks=peaks,
+            ends=_ends(coefficients, amplitudes),
+        )
+        return cls(amplitudes=amplitudes, certificates=certificates)
 
     @property
     def terms(self) -> int:
@@ -219,3 +251,13 @@ class UnitSeries:
             parts.append(orders @ coefficients.reshape(len(rows), orders.shape[2], -1))
         odd, even = parts
         return odd, even
+
+
+def _ends(coefficients: FloatArray, amplitudes: FloatArray) -> FloatArray:
+    """Return the derivatives 6 to 11 of laws at the end, shape (p, 6)."""
+    at_end, low, ends = _at_end(amplitudes.shape[1] - 1)
+    jets = amplitudes @ at_end
+    parts = (amplitudes @ low).reshape(*coefficients.shape, -1)
+    polynomial = np.einsum('pk,pkn->pn', coefficients, parts) @ ends
+    more = continued(coefficients, jets[..., None], polynomial[..., None])[:, :-1, 0]
+    return np.concatenate([jets[:, -1:], more], axis=1)

@@ -19,11 +19,11 @@ from typing import NamedTuple, Protocol
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.extremal import Mean
+from flat_planner_ros.core.motion_law.series_basis import speeds, TERMS
 from flat_planner_ros.core.motion_law.simple_roots import simple_roots, SimpleRoots
-from flat_planner_ros.core.motion_law.slow_law import speeds
 from flat_planner_ros.core.motion_law.unit_exponentials import UnitExponentials
 from flat_planner_ros.core.motion_law.unit_motions import Certificates, IntArray, Nodes
-from flat_planner_ros.core.motion_law.unit_series import FASTEST, UnitSeries
+from flat_planner_ros.core.motion_law.unit_series import UnitSeries
 import numpy as np
 
 CHUNK = 512
@@ -102,7 +102,7 @@ def _as_series(
 ) -> Iterator[UnitGroup]:
     """Return the motions of some equations as series of as many terms as they need."""
     slower = -1.0
-    for terms, limit in FASTEST.items():
+    for terms, limit in TERMS.items():
         some = rows[(slower < fastest[rows]) & (fastest[rows] <= limit)]
         for chunk in _chunks(some, CHUNK):
             found = _certified(_series(terms), coefficients, chunk, tolerance)

@@ -30,7 +30,7 @@ from flat_planner_ros.core.motion_law.extremal import (
     unit_motion,
 )
 from flat_planner_ros.core.motion_law.roots import Spectrum
-from flat_planner_ros.core.motion_law.slow_law import SLOW, speeds
+from flat_planner_ros.core.motion_law.series_basis import FASTEST, speeds
 from flat_planner_ros.core.motion_law.spectra import known_spectrum
 from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum
 import numpy as np
