@@ -202,7 +202,7 @@ class UnitMotion:
     law
         From -1/2 at t = 0 to 1/2 at t = 2; odd about the middle.
     rates
-        Of its exponentials; of a power series how fast it is, shape (m,) [-].
+        Of its exponentials; of a series how fast it is, shape (m,) [-].
     boundary_residual
         (31) of docs/derivation.md.
     optimality_residual

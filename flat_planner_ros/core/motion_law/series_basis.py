@@ -31,7 +31,7 @@ from flat_planner_ros.core.motion_law.law import JET_ORDER
 from flat_planner_ros.core.motion_law.legendre_series import integration, legendre_values
 import numpy as np
 
-TERMS = {0: 0.0, 6: 0.5, 10: 3.0, 16: 11.0, 24: 30.0, 32: 58.0}
+TERMS = {0: 0.0, 6: 1.0, 10: 4.5, 16: 11.0, 22: 20.0, 28: 30.0, 36: 42.0, 44: 56.0}
 """Fastest speed, in units of 2 / duration, for each number of terms, which then suffice [-]."""
 
 FASTEST = max(TERMS.values())

@@ -32,13 +32,6 @@ CHUNK = 512
 SORTED = 16 * CHUNK
 """Equations that are sorted together by the kinds of their roots."""
 
-EXPONENTIALS_FROM = 14.0
-"""
-Speed from which exponentials are tried first, in units of 2 / duration [-].
-
-A series then loses five digits, and takes as long.
-"""
-
 
 class UnitMotions(Protocol):
     """Unit motions of one form, p of them."""
@@ -82,37 +75,30 @@ def unit_table(coefficients: FloatArray, tolerance: float) -> Iterator[UnitGroup
         Residuals above which a motion is in no group [-].
 
     """
-    fastest = speeds(coefficients)
-    slow, fast = np.flatnonzero(fastest < EXPONENTIALS_FROM), fastest >= EXPONENTIALS_FROM
-    yield from _as_series(coefficients, slow, fastest, tolerance)
-    rows = np.flatnonzero(fast)
-    for part in _chunks(rows, SORTED):
-        for roots in simple_roots(coefficients[part]):
-            for chunk in _chunks(np.arange(len(roots.rows)), CHUNK):
-                some = roots.chosen(chunk)
-                found = _certified(_exponentials(some), coefficients, part[some.rows], tolerance)
-                if found is not None:
-                    fast[found.rows] = False
-                    yield found
-    yield from _as_series(coefficients, np.flatnonzero(fast), fastest, tolerance)
-
-
-def _as_series(
-    coefficients: FloatArray, rows: IntArray, fastest: FloatArray, tolerance: float
-) -> Iterator[UnitGroup]:
-    """Return the motions of some equations as series of as many terms as they need."""
-    slower = -1.0
-    for terms, limit in TERMS.items():
-        some = rows[(slower < fastest[rows]) & (fastest[rows] <= limit)]
-        for chunk in _chunks(some, CHUNK):
-            found = _certified(_series(terms), coefficients, chunk, tolerance)
-            if found is not None:
-                yield found
-        slower = limit
+    for form, rows in _forms(coefficients):
+        found = _certified(form, coefficients, rows, tolerance)
+        if found is not None:
+            yield found
 
 
 Form = Callable[[FloatArray], UnitMotions]
 """From equations to their motions."""
+
+
+def _forms(coefficients: FloatArray) -> Iterator[tuple[Form, IntArray]]:
+    """Return forms, and which equations are to be solved in each together."""
+    fastest = speeds(coefficients)
+    slower = -1.0
+    for terms, limit in TERMS.items():
+        some = np.flatnonzero((slower < fastest) & (fastest <= limit))
+        for chunk in _chunks(some, CHUNK):
+            yield _series(terms), chunk
+        slower = limit
+    for part in _chunks(np.flatnonzero(fastest > slower), SORTED):
+        for roots in simple_roots(coefficients[part]):
+            for chunk in _chunks(np.arange(len(roots.rows)), CHUNK):
+                some_roots = roots.chosen(chunk)
+                yield _exponentials(some_roots), part[some_roots.rows]
 
 
 def _series(terms: int) -> Form:

@@ -22,7 +22,6 @@ from flat_planner_ros.core.arm.errors import InvalidCost, InvalidRequest, NotFla
 from flat_planner_ros.core.arm.flat_map import FlatModel
 from flat_planner_ros.core.arm.planar_arm import PlanarArm
 from flat_planner_ros.core.motion_law.cost import Strategy
-from flat_planner_ros.core.motion_law.extremal import BoundaryConditions
 from flat_planner_ros.core.planning import certified_plan
 from flat_planner_ros.core.planning.motion_problem import problem_of
 from flat_planner_ros.core.planning.planner import plan
@@ -257,28 +256,44 @@ def test_refuses_a_law_that_misses_its_certificate(monkeypatch, paper_arm, const
     assert caught.value.tolerance == 0.0
 
 
-@pytest.mark.parametrize('damage', ['end', 'middle'])
-def test_certificates_see_a_law_that_is_wrong(monkeypatch, request, damage):
-    """A law for other ends misses the boundary, one for another cost the optimality."""
-    compute = extremals.unit_law
-    # A problem that no other test has: nothing of it is in the cache.
-    arm = paper_arm_with(2e-5)
-
-    def wrong(coefficients, clusters):
-        del clusters
-        if damage == 'middle':
-            return compute(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1])
-        end = 0.5 * np.eye(6)[0]
-        ends = BoundaryConditions(start=-end, end=end * (1.0 + 1e-8))
-        total = extremals.extremals(coefficients, 2.0, [ends])[0].total
-        return extremals.UnitLaw(total, compute(coefficients).rates)
-
-    monkeypatch.setattr(extremals, 'unit_law', wrong)
+@pytest.fixture
+def no_known_units():
+    """Forget what other tests planned, and what this one plans."""
     extremals.kept_units.cache_clear()
-    request.addfinalizer(extremals.kept_units.cache_clear)
-    quantity = {'end': 'boundary', 'middle': 'optimality'}[damage]
-    with pytest.raises(UncertifiedPlan, match=quantity):
-        plan(half_turn(), arm, STRATEGIES['energy'])
+    yield
+    extremals.kept_units.cache_clear()
+
+
+@pytest.mark.parametrize('damage', ['boundary', 'optimality'])
+@pytest.mark.parametrize('form', ['series', 'roots'])
+def test_certificates_see_a_law_that_is_wrong(monkeypatch, no_known_units, form, damage):
+    """A law for other ends misses the boundary, one for another cost the optimality."""
+    solved, solver = extremals.solved, extremals.BoundarySolver
+
+    def wrong_series(coefficients, terms):
+        if damage == 'optimality':
+            return solved(coefficients * [1, 1, 1 + 1e-6, 1, 1, 1, 1], terms)
+        found = solved(coefficients, terms)
+        return found._replace(amplitudes=found.amplitudes * (1.0 + 1e-8))
+
+    class WrongSolver(solver):
+        """Meets other ends."""
+
+        def total(self, target):
+            return super().total(target * (1.0 + 1e-8))
+
+    def wrong_roots(clusters, parity):
+        if damage == 'boundary':
+            return WrongSolver(clusters, parity)
+        return solver([c._replace(centre=c.centre * (1.0 + 1e-6)) for c in clusters], parity)
+
+    if form == 'roots':
+        monkeypatch.setattr(extremals, 'FASTEST', 0.0)
+        monkeypatch.setattr(extremals, 'BoundarySolver', wrong_roots)
+    else:
+        monkeypatch.setattr(extremals, 'solved', wrong_series)
+    with pytest.raises(UncertifiedPlan, match=damage):
+        plan(half_turn(), paper_arm_with(2e-5), STRATEGIES['energy'])
 
 
 @pytest.mark.parametrize(('distance', 'duration'), [(1e308, 1e-3), (1.0, 1e-70)])
