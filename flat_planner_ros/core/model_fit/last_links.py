@@ -180,6 +180,16 @@ class Steps(NamedTuple):
         on_last = linear_flow(models, step, on_last=True)
         return cls(models, whole, on_last, Stages.of(models, step, whole), has_friction)
 
+    def of_first(self) -> 'Steps':
+        """Return those of the first model alone."""
+        return Steps(
+            self.models[:1],
+            Flow(*(part[:1] for part in self.whole)),
+            Flow(*(part[:1] for part in self.on_last)),
+            Stages(*(part[:1] for part in self.stages)),
+            self.has_friction,
+        )
+
 
 def trajectories(steps: Steps, starts: FloatArray, forcing: Forcing) -> FloatArray:
     """

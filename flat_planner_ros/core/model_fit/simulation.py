@@ -182,8 +182,8 @@ def seen_with_slopes(
     errors = BaseErrors.none(len(unknowns)) if own is None else own.of(block)
     has_friction = bool(models[:, COULOMB].any())
     step = step_for(models[0], has_friction) / observed.refinement
-    steps = Steps.of(models[:1], step, has_friction=has_friction)
-    law = StepLaw.of(Steps.of(models, step, has_friction=has_friction))
+    every = Steps.of(models, step, has_friction=has_friction)
+    law, first = StepLaw.of(every), every.of_first()
     by_errors = STATES + len(law.changes)
     seen = samples.empty(1)
     slopes = samples.empty(by_errors + errors.nodes.shape[1])
@@ -194,7 +194,7 @@ def seen_with_slopes(
         near = errors.near(chunk.grid)
         base = chunk.forcing.base + near.between(off)[:, None, :]
         forcing = chunk.forcing._replace(base=base)
-        motion = motions(steps, starts, forcing._replace(variant=forcing.variant[:1]))
+        motion = motions(first, starts, forcing._replace(variant=forcing.variant[:1]))
         by_step = step_slopes(law, motion[:, 0], forcing)
         carried = carried_on(by_step, near.shares)
         # A copy: what led to it need not stay.
