@@ -323,9 +323,7 @@ class Excitation:
             return None
         heard = joined(self._parts[-KEPT:])
         try:
-            # From little that is told a fit tries models that run away.
-            with np.errstate(over='ignore', invalid='ignore'):
-                fit = fit_model(heard, self._arm)
+            fit = fit_model(heard, self._arm)
         except (FlatPlannerError, np.linalg.LinAlgError):
             return None
         found, believed = (

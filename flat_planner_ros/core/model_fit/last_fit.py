@@ -259,13 +259,11 @@ def _tried(
     observed: Observed, attempt: _Attempt, scales: FloatArray, noise: FloatArray
 ) -> Refined:
     """Return the rough fit that begins with a guess."""
-    # From little that is told a fit tries models that run away.
-    with np.errstate(over='ignore', invalid='ignore'):
-        starts = settled(observed, attempt.guess, noise)
-        found = refine(observed, attempt.guess, attempt.first, scales, noise, starts, ROUGH)
-        starts = settled(observed, found.parameters, found.spread, found.starts)
-        every = range(len(NAMES))
-        return refine(observed, found.parameters, every, scales, noise, starts, ROUGH)
+    starts = settled(observed, attempt.guess, noise)
+    found = refine(observed, attempt.guess, attempt.first, scales, noise, starts, ROUGH)
+    starts = settled(observed, found.parameters, found.spread, found.starts)
+    every = range(len(NAMES))
+    return refine(observed, found.parameters, every, scales, noise, starts, ROUGH)
 
 
 def _is_explained(sharper: Observed, found: Refined, noise: FloatArray) -> bool:

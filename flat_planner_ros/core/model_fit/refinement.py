@@ -135,6 +135,7 @@ class Refined(NamedTuple):
     around: Linearisation
 
 
+@np.errstate(over='ignore', invalid='ignore')
 def linearised(
     observed: Observed,
     model: FloatArray,
@@ -146,7 +147,7 @@ def linearised(
     keeps: bool = False,
 ) -> Linearisation:
     """
-    Return misfit and sensitivities.
+    Return misfit and sensitivities; those of a model that runs away are not finite.
 
     Parameters
     ----------
@@ -326,9 +327,7 @@ def _tried(
 ) -> tuple[tuple[FloatArray, FloatArray], Linearisation]:
     """Return where a step leads, and the misfit there."""
     trial = _stepped(point, around, step, free)
-    # A model that a bad step makes unstable leaves all bounds, and is refused by its cost.
-    with np.errstate(over='ignore', invalid='ignore'):
-        return trial, linearised(observed, *trial, free, scales, spread)
+    return trial, linearised(observed, *trial, free, scales, spread)
 
 
 def _is_better(there: Linearisation, here: Linearisation) -> bool:

@@ -49,11 +49,14 @@ TINY = 1e-9
 """Added to normal equations of states that nothing shows, relative to the largest [-]."""
 
 
+@np.errstate(over='ignore', invalid='ignore')
 def settled(
     observed: Observed, model: FloatArray, spread: FloatArray, *known: FloatArray
 ) -> FloatArray:
     """
     Return the starts from which a model comes nearest to what was measured, (segments, 4).
+
+    Where it runs away from a start, that is not one of them.
 
     Parameters
     ----------
