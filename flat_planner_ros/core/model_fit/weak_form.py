@@ -37,6 +37,7 @@ from flat_planner_ros.core.model_fit.last_links import (
 )
 from flat_planner_ros.core.model_fit.signals import Segment
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 WINDOW = 0.4
 """Length of a window relative to the free period of the passive joint [-]."""
@@ -113,19 +114,10 @@ class Windows:
 
     def __call__(self, signal: FloatArray, order: int = 0) -> FloatArray:
         """Return the means of a signal's derivative of some order, 0 to 2; shape (windows,)."""
-        stride, window = self._stride, (-1) ** order * self._windows[order]
-        count = max((signal.size - window.size) // stride + 1, 0)
-        # Neighbours are a stride apart: a stretch of one is weighted for all that it is in.
-        parts = -(-window.size // stride)
-        weights = np.zeros(parts * stride)
-        weights[: window.size] = window
-        samples = np.zeros((count + parts - 1) * stride)
-        seen = min(samples.size, signal.size)
-        samples[:seen] = signal[:seen]
-        weighted = weights.reshape(parts, stride) @ samples.reshape(-1, stride).T
-        found = np.zeros(count)
-        for place, part in enumerate(weighted):
-            found += part[place : place + count]
+        window = (-1) ** order * self._windows[order]
+        if signal.size < window.size:
+            return np.empty(0)
+        found: FloatArray = sliding_window_view(signal, window.size)[:: self._stride] @ window
         return found
 
     def pieces(self, count: int) -> Iterator[Segment]:
