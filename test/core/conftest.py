@@ -24,15 +24,21 @@ import pytest
 ARM = PlanarArm.reduced(inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5)
 """That of the paper's table, with its damping."""
 
+
+def first_links(count=1, *, com=1.0, mass=1.0, inertia=1.0, tip=1.0):
+    """Return what `PlanarArm.reduced` takes of so many links, changed by factors, (count,)."""
+    ones = np.ones(count)
+    return {
+        'link_length': 0.2 * ones,
+        'link_com': 0.1 * ones * com,
+        'link_mass': 0.3 * ones * mass,
+        'link_inertia': 1e-3 * ones * inertia,
+        'tip_mass': 0.1 * tip,
+    }
+
+
 ELBOW = PlanarArm.reduced(
-    inertia_star=(6.4e-4, 3.3e-5),
-    stiffness=3e-3,
-    damping=2e-5,
-    link_length=[0.2],
-    link_com=[0.1],
-    link_mass=[0.3],
-    link_inertia=[1e-3],
-    tip_mass=0.1,
+    inertia_star=(6.4e-4, 3.3e-5), stiffness=3e-3, damping=2e-5, **first_links()
 )
 """The same behind a first link."""
 

@@ -16,6 +16,7 @@
 
 from math import inf, pi
 
+from core.conftest import first_links
 from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
 from flat_planner_ros.core.excitation import Excitation, ExcitationSettings, Room
 from flat_planner_ros.core.model_fit import Measurements
@@ -141,11 +142,7 @@ def three(inertia, friction, *, factor=1.0):
         inertia_star=(7.2e-4 * factor, 1.3e-4),
         stiffness=8e-3 * factor,
         damping=8e-5,
-        link_length=[0.2],
-        link_com=[0.1],
-        link_mass=[0.3],
-        link_inertia=[inertia],
-        tip_mass=0.1,
+        **first_links(inertia=inertia),
         viscous_friction=friction[0],
         coulomb_friction=friction[1],
     )
@@ -153,8 +150,8 @@ def three(inertia, friction, *, factor=1.0):
 
 def test_an_arm_of_three_tells_its_last_links_first_and_then_the_other():
     rng = np.random.default_rng(2)
-    true = three(1e-3, ([6e-3, 2e-4], [2e-3, 5e-4]))
-    believed = three(3.4e-3, ([0.0, 0.0], [0.0, 0.0]), factor=1.2)
+    true = three(1.0, ([6e-3, 2e-4], [2e-3, 5e-4]))
+    believed = three(3.4, ([0.0, 0.0], [0.0, 0.0]), factor=1.2)
     assert believed.inertia[0, 0] == pytest.approx(1.3 * true.inertia[0, 0], abs=1e-6)
     limits = JointLimits.of(3, effort=np.array([0.4, 0.06, inf]))
     bench = Bench(true, believed, limits, rng)

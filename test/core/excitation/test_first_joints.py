@@ -17,6 +17,7 @@
 from dataclasses import replace
 from math import inf
 
+from core.conftest import first_links
 from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
 from flat_planner_ros.core.excitation import ExcitationSettings, Room
 from flat_planner_ros.core.excitation.first_joints import FirstJoints
@@ -39,11 +40,7 @@ def arm_of(count, gravity, factors, friction, last):
         inertia_star=(7.2e-4 * last[0], 1.3e-4 * last[1]),
         stiffness=8e-3 * last[2],
         damping=8e-5,
-        link_length=[0.2] * count,
-        link_com=[0.1] * count,
-        link_mass=0.3 * factors[:count],
-        link_inertia=1e-3 * factors[:count],
-        tip_mass=0.1 * factors[count],
+        **first_links(count, mass=factors[:-1], inertia=factors[:-1], tip=factors[-1]),
         gravity=gravity,
         viscous_friction=[*friction[0], 2e-4 * last[3]],
         coulomb_friction=[*friction[1], 5e-4 * last[3]],

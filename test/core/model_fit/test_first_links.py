@@ -17,6 +17,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+from core.conftest import first_links
 from flat_planner_ros.core.arm import InvalidRequest, PlanarArm
 from flat_planner_ros.core.model_fit import fit_model, Measurements, Trust
 from flat_planner_ros.core.model_fit.first_fit import fit_first_links
@@ -43,15 +44,9 @@ def arms(count, gravity, seed):
     rng = np.random.default_rng(seed)
 
     def first(off):
-        factor = 1.0 + rng.uniform(-off, off, (5, count))
-        return {
-            'link_length': [0.2] * count,
-            'link_com': 0.1 * factor[0],
-            'link_mass': 0.3 * factor[1],
-            'link_inertia': 1e-3 * factor[2],
-            'tip_mass': 0.1 * factor[3, 0],
-            'gravity': gravity,
-        }
+        com, mass, inertia, tips, _ = 1.0 + rng.uniform(-off, off, (5, count))
+        links = first_links(count, com=com, mass=mass, inertia=inertia, tip=tips[0])
+        return {**links, 'gravity': gravity}
 
     believed = PlanarArm.reduced(
         inertia_star=(6.4e-4, 1.5e-4), stiffness=9e-3, damping=6e-5, **first(0.0)

@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 
+from core.conftest import first_links
 from flat_planner_ros.core.arm import PlanarArm
 from flat_planner_ros.core.model_fit import (
     first_misprediction,
@@ -72,14 +73,7 @@ def test_friction_acts_on_what_joint_n_1_turns_relative_to_the_base():
 def test_first_links_of_another_inertia_mispredict_efforts_by_as_much():
     """Second route: the arm's own efforts of a smooth motion in a plane, without friction."""
     arm = PlanarArm.reduced(
-        inertia_star=(7e-4, 1e-4),
-        stiffness=8e-3,
-        damping=6e-5,
-        link_length=[0.2],
-        link_com=[0.1],
-        link_mass=[0.3],
-        link_inertia=[1e-3],
-        tip_mass=0.1,
+        inertia_star=(7e-4, 1e-4), stiffness=8e-3, damping=6e-5, **first_links()
     )
     speeds = 4.0 * np.pi * np.array([1.0, 2.0, 2.0])
     phases = np.outer(TIMES, speeds)
