@@ -19,7 +19,8 @@ from functools import lru_cache
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import block_of, combined, row_factors
-from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
+from flat_planner_ros.core.motion_law.roots import Cluster
+from flat_planner_ros.core.motion_law.spectra import known_spectrum
 from flat_planner_ros.core.motion_law.term_sum import plain_factors, term_sum, TermSum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
@@ -106,12 +107,24 @@ class BoundarySolver:
 
 
 @lru_cache(maxsize=SOLVERS_KEPT)
-def boundary_solver(equation: bytes, parity: float) -> BoundarySolver:
-    """Return the solver of an equation in normalised time, the bytes of its coefficients."""
-    return BoundarySolver(_clusters(equation), parity)
+def boundary_solver(equation: bytes, half: float, parity: float) -> BoundarySolver:
+    """
+    Return the solver of an equation in normalised time.
+
+    Parameters
+    ----------
+    equation
+        The bytes of its coefficients a_0 ... a_6 in physical time.
+    half
+        Half of the duration [s].
+    parity
+        1 for the even solutions, -1 for the odd ones.
+
+    """
+    return BoundarySolver(_clusters(equation, half), parity)
 
 
 @lru_cache(maxsize=SOLVERS_KEPT)
-def _clusters(equation: bytes) -> Sequence[Cluster]:
-    """Return the clusters of its roots."""
-    return Spectrum(np.frombuffer(equation)).clusters()
+def _clusters(equation: bytes, half: float) -> Sequence[Cluster]:
+    """Return the clusters of its roots, which both parities share."""
+    return known_spectrum(equation).clusters(half)

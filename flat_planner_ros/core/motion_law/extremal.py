@@ -117,7 +117,7 @@ def extremals(
     """
     half = 0.5 * duration
     powers = half**_ORDERS
-    equation = (coefficients * powers[::-1] ** 2).tobytes()
+    equation = coefficients.tobytes()
     laws = []
     for ends in conditions:
         start = ends.start * powers[:CONDITIONS]
@@ -133,7 +133,7 @@ def extremals(
             if parity > 0.0:
                 target[0] -= middle
             if target.any():
-                terms.extend(boundary_solver(equation, parity).terms(target))
+                terms.extend(boundary_solver(equation, half, parity).terms(target))
         laws.append(SummedLaw(duration=duration, total=term_sum(terms)))
     return laws
 
