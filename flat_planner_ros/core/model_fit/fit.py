@@ -92,7 +92,8 @@ def fit_model(
     Raises
     ------
     InvalidRequest
-        The measurements are of another arm, too few, or of one that does not move.
+        The measurements are of another arm, too few, of one that does not move, or of one that is
+        nothing like the start.
     NotFlat
         The arm of the start is not flat.
 

@@ -244,7 +244,7 @@ def _first(
         scales = scales_of(observed, attempt.guess)
         try:
             found = _tried(coarse, attempt, scales, noise)
-        except np.linalg.LinAlgError:  # it has run away
+        except (InvalidRequest, np.linalg.LinAlgError):  # it has run away
             continue
         if best is None or found.around.cost < best.around.cost:
             best, best_scales = found, scales

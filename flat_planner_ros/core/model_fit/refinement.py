@@ -25,15 +25,9 @@ from collections.abc import Iterator, Sequence
 from math import sqrt
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray
+from flat_planner_ros.core.arm import FloatArray, InvalidRequest
 from flat_planner_ros.core.model_fit.correlation import lags_for, products
-from flat_planner_ros.core.model_fit.last_links import (
-    BOTH,
-    LAST,
-    STATES,
-    step_for,
-    STIFFNESS,
-)
+from flat_planner_ros.core.model_fit.last_links import BOTH, LAST, STATES, step_for, STIFFNESS
 from flat_planner_ros.core.model_fit.simulation import (
     blocks,
     CHANNELS,
@@ -283,7 +277,7 @@ def refine(
     Parameters are as for `linearised`; without starts those measured are taken. The last step is
     at most `converged` standard errors of white noise. Damping shortens the step of the parameters
     alone: where a short step is refused, and that of the segments' own unknowns by itself, too,
-    none between the two is better.
+    none between the two is better. A first model that runs away is an `InvalidRequest`.
     """
     point = parameters.copy(), first_starts(observed) if starts is None else starts
     best = linearised(observed, *point, free, scales, spread)
@@ -337,6 +331,11 @@ def _is_better(there: Linearisation, here: Linearisation) -> bool:
 
 def _step(around: Linearisation, damping: float, scales: FloatArray) -> FloatArray:
     """Return the step of the free parameters, damped by Marquardt's parameter."""
+    if not (np.isfinite(around.normal).all() and np.isfinite(around.gradient).all()):
+        raise InvalidRequest(
+            'the fit runs away: no model near the one believed explains what was measured; are '
+            'units and signs of angles and efforts right, and the inertias roughly?'
+        )
     normal = around.normal.sum(axis=0) * np.outer(scales, scales)
     normal += damping * np.diag(np.diag(normal))
     gradient = scales * around.gradient.sum(axis=0)

@@ -17,18 +17,21 @@
 from functools import partial
 import tracemalloc
 
+from flat_planner_ros.core.arm import InvalidRequest
 from flat_planner_ros.core.model_fit import Measurements
 from flat_planner_ros.core.model_fit.last_fit import even_signals
+from flat_planner_ros.core.model_fit.last_links import VISCOUS
 from flat_planner_ros.core.model_fit.observation import (
     noise_of_links,
     observed_of,
     smoothed_rates,
 )
-from flat_planner_ros.core.model_fit.refinement import linearised
+from flat_planner_ros.core.model_fit.refinement import linearised, refine
 from flat_planner_ros.core.model_fit.signals import Even, Segment
 from flat_planner_ros.core.model_fit.simulation import Observed
 from flat_planner_ros.core.model_fit.weak_form import weak_guess
 import numpy as np
+import pytest
 
 MODEL = np.array([7e-4, 3e-5, 2.7e-3, 2.5e-5, 2e-4, 5e-4, 0.0, 0.0])
 SAMPLES = 60
@@ -68,6 +71,13 @@ def test_memory_grows_neither_with_segments_nor_with_their_length():
     few = peak_memory(20, 0.06)
     assert peak_memory(40, 0.06) < 1.1 * few
     assert peak_memory(20, 0.2) < 1.1 * few
+
+
+def test_a_model_that_runs_away_is_refused_without_a_warning():
+    observed, away = swinging(2, 0.06), MODEL.copy()
+    away[VISCOUS] = -1.0  # speeds grow by e in 0.7 ms
+    with pytest.raises(InvalidRequest, match='runs away.* units and signs'):
+        refine(observed, away, range(8), np.abs(MODEL) + 1e-3, np.ones(2))
 
 
 def noise(samples):
