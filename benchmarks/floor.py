@@ -18,6 +18,7 @@ from collections.abc import Callable
 
 from flat_planner_ros.core import Plan
 from flat_planner_ros.core.motion_law import probes
+from flat_planner_ros.core.motion_law.series_basis import PROBE_DEPTH
 import numpy as np
 import problem
 
@@ -58,11 +59,12 @@ def _series_operations(terms: int) -> Callable[[], object]:
 
 def _certificate_operations(terms: int) -> Callable[[], object]:
     """Return what gives derivatives and parts of the equation for the certificate, and sums."""
-    weights, amplitudes = np.ones(ORDERS), np.ones(terms + 1)
-    table = np.ones((terms + 1, 2 * ORDERS * probes().shape[1]))
+    weights, amplitudes = np.ones(ORDERS - 1), np.ones(terms + 1)
+    table = np.ones((terms + 1, (2 * ORDERS - 1) * probes(PROBE_DEPTH).shape[1]))
 
     def run() -> object:
-        jet, parts = (amplitudes @ table).reshape(2, ORDERS, -1)
+        values = (amplitudes @ table).reshape(2 * ORDERS - 1, -1)
+        jet, parts = values[:ORDERS], values[ORDERS:]
         return np.abs(jet).max(axis=1), weights @ parts, weights @ np.abs(parts)
 
     return run

@@ -32,13 +32,19 @@ UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
 
 
 @cache
-def probes() -> FloatArray:
+def probes(depth: int = PROBE_DEPTH) -> FloatArray:
     """
     Return x + 1 and 1 - x at times that crowd towards the start as fast as boundary layers can.
 
     They run from 0 to 1, as one half of a motion has enough; the last one is the end, 2.
+
+    Parameters
+    ----------
+    depth
+        Halvings of the distance to the start.
+
     """
-    layers = 0.5 ** np.arange(0.0, PROBE_DEPTH + 1.0)
+    layers = 0.5 ** np.arange(0.0, depth + 1.0)
     times = np.union1d(layers, np.linspace(0.0, 1.0, PROBES + 1))
     times = np.append(times, 2.0)
     return np.array([times, 2.0 - times])

@@ -328,7 +328,7 @@ def _as_series(coefficients: FloatArray, speed: float) -> UnitMotion:
         law=SummedLaw(duration=2.0, total=total),
         rates=np.array([complex(speed)]),
         boundary_residual=float(boundary_residual(jet, peaks)),
-        optimality_residual=float(relative_sum(coefficients, parts)) + SAME,
+        optimality_residual=float(relative_sum(coefficients[1:], parts)) + SAME,
         costate=float(cost),
         peaks=peaks,
     )

@@ -37,8 +37,8 @@ TERMS = {0: 0.0, 6: 1.0, 10: 4.5, 16: 11.0, 22: 20.0, 28: 30.0, 36: 42.0, 44: 56
 FASTEST = max(TERMS.values())
 """Speed up to which a law is a series, in units of 2 / duration [-]."""
 
-BASES_KEPT = 8
-"""Bases of different size, and values of them, that are remembered."""
+PROBE_DEPTH = 8
+"""Halvings of the distance to the start at which a series is certified: it has no thin layers."""
 
 
 _EXPONENTS = 1.0 / (SOLUTIONS - 2.0 * np.arange(CONDITIONS))
@@ -92,7 +92,7 @@ def terms_for(speed: float) -> int:
     return next(terms for terms, fastest in TERMS.items() if speed <= fastest)
 
 
-@lru_cache(maxsize=BASES_KEPT)
+@lru_cache(maxsize=len(TERMS))
 def series_basis(terms: int) -> SeriesBasis:
     """Return the basis whose changes have an odd Legendre polynomial each as w^(6)."""
     degrees = np.array([*range(CONDITIONS + 1, CONDITIONS + 1 + 2 * terms, 2), CONDITIONS - 1])
@@ -166,8 +166,8 @@ class Probed(NamedTuple):
     jets
         Derivatives 0 to 6, shape (..., 7, m).
     parts
-        w^(2k - 6) without its share of polynomials below the sixth degree, shape (..., 7, m): of
-        a stationary law they add up to zero with the factors a_k.
+        w^(2k - 6), k = 1 ... 6, without its share of polynomials below the sixth degree, shape
+        (..., 6, m): of a stationary law they add up to zero with the factors a_k.
 
     """
 
@@ -178,20 +178,20 @@ class Probed(NamedTuple):
 def probed(amplitudes: FloatArray) -> Probed:
     """Return what certifies laws by their amplitudes, shape (..., terms + 1)."""
     values = amplitudes @ _at_probes(amplitudes.shape[-1] - 1)
-    table = values.reshape(*amplitudes.shape[:-1], 2, JET_ORDER + 1, -1)
-    return Probed(table[..., 0, :, :], table[..., 1, :, :])
+    table = values.reshape(*amplitudes.shape[:-1], 2 * JET_ORDER + 1, -1)
+    return Probed(table[..., : JET_ORDER + 1, :], table[..., JET_ORDER + 1 :, :])
 
 
-@lru_cache(maxsize=BASES_KEPT)
+@lru_cache(maxsize=len(TERMS))
 def _at_probes(terms: int) -> FloatArray:
-    """Return both tables of `Probed` for a basis, shape (terms + 1, 2 * 7 * m)."""
-    after_start, before_end = probes()
+    """Return both tables of `Probed` for a basis, shape (terms + 1, 13 m)."""
+    after_start, before_end = probes(PROBE_DEPTH)
     places = np.where(after_start < 1.0, after_start - 1.0, 1.0 - before_end)
     derivatives = series_basis(terms).derivatives
     values = legendre_values(places, derivatives.shape[1])
     jets = np.einsum('kst,sm->tkm', derivatives[JET_ORDER:], values)
-    parts = np.einsum('kst,sm->tkm', derivatives[::2, CONDITIONS:], values[CONDITIONS:])
-    return locked(np.stack([jets, parts], axis=1).reshape(terms + 1, -1))
+    parts = np.einsum('kst,sm->tkm', derivatives[2::2, CONDITIONS:], values[CONDITIONS:])
+    return locked(np.concatenate([jets, parts], axis=1).reshape(terms + 1, -1))
 
 
 def continued(coefficients: FloatArray, jets: FloatArray, polynomial: FloatArray) -> FloatArray:

@@ -21,12 +21,20 @@ from flat_planner_ros.core.arm import FloatArray, locked
 from flat_planner_ros.core.motion_law.chebyshev_series import chebyshev_values, from_legendre
 from flat_planner_ros.core.motion_law.law import JET_ORDER
 from flat_planner_ros.core.motion_law.legendre_series import differentiation
-from flat_planner_ros.core.motion_law.series_basis import continued, LOW_DEGREES, series_basis
+from flat_planner_ros.core.motion_law.series_basis import (
+    continued,
+    LOW_DEGREES,
+    series_basis,
+    TERMS,
+)
 from flat_planner_ros.core.motion_law.term_sum import CHUNK, FEW, grid_blocks
 import numpy as np
 
-VALUES_KEPT = 4
-"""Tables of Chebyshev polynomials that are remembered: goals of one duration share them."""
+GRIDS_KEPT = 4
+"""Tables of Chebyshev polynomials on even grids that are remembered."""
+
+PLACES_KEPT = 16
+"""Tables at other places that are remembered: the nodes of a quadrature suit many laws."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,7 +118,7 @@ class SeriesSum:
         return np.concatenate([table[JET_ORDER:], more]) @ from_legendre(size).T
 
 
-@lru_cache(maxsize=VALUES_KEPT)
+@lru_cache(maxsize=len(TERMS))
 def _chebyshev(terms: int) -> FloatArray:
     """Return Chebyshev coefficients of the derivatives 0 to 6 of a basis, (terms + 1, 7 size)."""
     table = series_basis(terms).derivatives[JET_ORDER:]
@@ -119,13 +127,13 @@ def _chebyshev(terms: int) -> FloatArray:
     return locked(series.reshape(terms + 1, -1))
 
 
-@lru_cache(maxsize=VALUES_KEPT)
+@lru_cache(maxsize=PLACES_KEPT)
 def _kept_values(places: bytes, size: int) -> FloatArray:
     """Return Chebyshev polynomials by the bytes of the places."""
     return locked(chebyshev_values(np.frombuffer(places), size))
 
 
-@lru_cache(maxsize=VALUES_KEPT)
+@lru_cache(maxsize=GRIDS_KEPT)
 def _grid_values(size: int, intervals: int, start: int) -> tuple[FloatArray, FloatArray]:
     """Return odd and even polynomials on the part of an even grid that is evaluated together."""
     x = grid_blocks(intervals)[2][start : start + CHUNK]

@@ -216,9 +216,10 @@ def trapezoid(
     # sum_j w'_j cosh(j z h) by Clenshaw's recurrence.
     cosh = np.cosh(step * poles)
     double = 2.0 * cosh
-    current, last = np.zeros_like(poles), np.zeros_like(poles)
+    current, last, product = np.zeros_like(poles), np.zeros_like(poles), np.empty_like(poles)
     for column in velocities.T[:0:-1]:
-        np.subtract(double * current, last, out=last)
+        np.multiply(double, current, out=product)
+        np.subtract(product, last, out=last)
         last += column[:, None]
         current, last = last, current
     inner = velocities[:, :1] + 2.0 * (cosh * current - last)

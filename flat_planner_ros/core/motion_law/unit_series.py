@@ -165,7 +165,7 @@ class UnitSeries:
         certificates = Certificates(
             coefficients=coefficients,
             boundary_residual=boundary_residual(jets, peaks),
-            optimality_residual=relative_sum(coefficients, parts) + SAME,
+            optimality_residual=relative_sum(coefficients[:, 1:], parts) + SAME,
             costate=cost,
             peaks=peaks,
             ends=_ends(coefficients, amplitudes),
@@ -190,13 +190,15 @@ class UnitSeries:
         degrees = np.arange(float(2 * odd.shape[2]))
         square = odd**2 @ (1.0 / (2.0 * degrees[1::2] + 1.0))
         square += even**2 @ (1.0 / (2.0 * degrees[::2] + 1.0))
-        return Mean(square, (np.abs(odd @ at_odd) + np.abs(even @ at_even)).max(axis=2))
+        return Mean(
+            square, (np.abs(_sums(odd, at_odd)) + np.abs(_sums(even, at_even))).max(axis=2)
+        )
 
     def at_nodes(self, rows: FloatArray) -> Iterator[Nodes]:
         """Return combinations of derivatives at the nodes of a quadrature, rows (p, m, 7)."""
         odd, even = self._combined(rows)
         weights, at_odd, at_even = _at_nodes(self.terms)
-        odd, even = odd @ at_odd, even @ at_even
+        odd, even = _sums(odd, at_odd), _sums(even, at_even)
         yield Nodes(np.arange(len(rows)), weights, (even + odd, even - odd))
 
     def on_even_grid(self, rows: FloatArray, intervals: int) -> FloatArray:
@@ -218,7 +220,9 @@ class UnitSeries:
         """
         odd, even = self._combined(rows)
         at_odd, at_even = _on_grid(self.terms, intervals)
-        return mirrored_grid(odd @ at_odd, even @ at_even, rows, self.certificates, intervals)
+        return mirrored_grid(
+            _sums(odd, at_odd), _sums(even, at_even), rows, self.certificates, intervals
+        )
 
     def transform(self, poles: ComplexArray) -> ComplexArray:
         """
@@ -251,6 +255,12 @@ class UnitSeries:
             parts.append(orders @ coefficients.reshape(len(rows), orders.shape[2], -1))
         odd, even = parts
         return odd, even
+
+
+def _sums(series: FloatArray, values: FloatArray) -> FloatArray:
+    """Return sums of polynomials, (p, m, places), of coefficients (p, m, n), as one product."""
+    sums: FloatArray = series.reshape(-1, series.shape[2]) @ values
+    return sums.reshape(*series.shape[:2], -1)
 
 
 def _ends(coefficients: FloatArray, amplitudes: FloatArray) -> FloatArray:

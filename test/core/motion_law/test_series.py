@@ -149,6 +149,6 @@ def test_the_residual_is_that_of_the_equation_six_times_integrated():
     values = np.array([legendre.legval(nodes, [0] * 6 + list(p[6:])) for p in parts[::-1]])
     total = np.abs(equation @ values).max() / (np.abs(equation) @ np.abs(values)).max()
     assert total <= 1e-13
-    assert float(relative_sum(equation, probed(amplitudes).parts)) <= 1e-13
+    assert float(relative_sum(equation[1:], probed(amplitudes).parts)) <= 1e-13
     other = equation * (1.0 + 1e-6 * np.arange(7.0))
-    assert 1e-8 < float(relative_sum(other, probed(amplitudes).parts)) < 1e-5
+    assert 1e-8 < float(relative_sum(other[1:], probed(amplitudes).parts)) < 1e-5
