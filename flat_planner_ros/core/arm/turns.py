@@ -68,6 +68,8 @@ class TurnCounter:
                 break
         else:
             is_first = self._former is None
+            if is_first and np.isinf(sample.positions).any():
+                return sample
             self._earlier, self._former, self._last = self._former, sample, positions
             if is_first and self._place is not None:
                 self.align(self._place)
@@ -80,7 +82,8 @@ class TurnCounter:
         former = self._former
         if former is None:
             return None
-        change = np.diff(samples.positions, axis=0, prepend=former.positions[None])
+        with np.errstate(invalid='ignore'):  # infinite twice in a row is no step
+            change = np.diff(samples.positions, axis=0, prepend=former.positions[None])
         if not np.abs(change).max() <= pi:
             return None
         if len(samples.times) > 1:
@@ -139,7 +142,7 @@ class TurnCounter:
         if is_half.any():
             self._turns = self.turns - np.sign(change) * is_half
         # Where an angle is unknown, what it was before is still to be compared with.
-        angles = np.where(np.isnan(raw), last, raw)
+        angles = np.where(np.isfinite(raw), raw, last)
         self._remember(former, replace(sample, positions=angles))
 
     def _know(self, is_whole: BoolArray) -> BoolArray:

@@ -14,9 +14,9 @@
 
 """Turns of wrapped encoders: counted where an arm turns, not where it is put elsewhere."""
 
-from math import nan, pi
+from math import inf, nan, pi
 
-from flat_planner_ros.core.arm import JointSample, TurnCounter
+from flat_planner_ros.core.arm import JointSample, SampleTable, TurnCounter
 import numpy as np
 import pytest
 
@@ -38,6 +38,23 @@ def sample(time, positions, velocities=None):
 def unwrapped(counter, *samples):
     """Return the angles that a counter makes of samples."""
     return np.array([counter.unwrapped(s).positions for s in samples])
+
+
+@pytest.mark.parametrize('infinite', [inf, -inf])
+def test_an_infinite_angle_is_none(infinite):
+    """First, between others or twice in a row: what is finite is counted from what was finite."""
+    counter = TurnCounter()
+    counter.unwrapped(sample(0.0, [infinite]))
+    counter.align(np.array([2.0 * pi + 3.1]))
+    assert not counter.turns.any()
+    angles = [3.1, infinite, infinite, -3.1, -3.0]
+    found = unwrapped(counter, *(sample(0.005 * k, [q]) for k, q in enumerate(angles, start=1)))
+    assert found[[0, 3, 4], 0] == pytest.approx([2.0 * pi + 3.1, 4.0 * pi - 3.1, 4.0 * pi - 3.0])
+    assert np.isinf(found[1:3]).all()
+    table = SampleTable(
+        times=np.array([0.03, 0.035]), positions=np.full((2, 1), infinite), velocities=None
+    )
+    assert counter.unwrapped_table(table) is None
 
 
 @pytest.mark.parametrize('period', [0.001, 0.01, 0.1])
