@@ -66,6 +66,7 @@ class TrackerNode(GuardedNode):
         self._tracker = Tracker(settings.arm, settings.tracker)
         self._renewal = TrackerRenewal(settings.arm, settings.tracker)
         self._fault, self._phase = '', self._tracker.phase
+        self._ahead = 0.0
         self._reader = JointStateReader(settings.joints, settings.joint_states)
         efforts = interfaces.EFFORT_COMMANDS
         self._efforts = self.create_publisher(Float64MultiArray, efforts, interfaces.RELIABLE)
@@ -112,11 +113,15 @@ class TrackerNode(GuardedNode):
 
     def rest(self) -> None:
         """Give no more efforts until the next command; the last ones are zero."""
-        self._send(self._tracker.drop(self._now()))
+        self._send(self._tracker.drop(self._present()))
 
     def _now(self) -> float:
         """Return the node's time [s]."""
         return stamps.now(self.get_clock())
+
+    def _present(self) -> float:
+        """Return the time by the clock of the joint states, if that is ahead of the node's [s]."""
+        return self._now() + self._ahead
 
     def _on_command(self, data: bytes) -> None:
         """Follow a motion; one that cannot be followed leaves the present one alone."""
@@ -140,14 +145,16 @@ class TrackerNode(GuardedNode):
             self._log.info(f'follows the adopted model: {self._tracker.certificate.sentence}')
         for sample in samples:
             self._rate.heard(sample.time)
-            self._send(self._tracker.hear(sample, max(self._now(), sample.time)))
+            now = self._now()
+            self._ahead = max(0.0, sample.time - now)
+            self._send(self._tracker.hear(sample, now + self._ahead))
 
     def _on_look(self) -> None:
         """Notice silence, and go on with an effort that fades."""
         steady = stamps.now(self._steady)
         elapsed, self._looked = steady - self._looked, steady
         if elapsed <= LATE_LOOK * self._look_period:
-            self._send(self._tracker.watch(self._now()))
+            self._send(self._tracker.watch(self._present()))
 
     def _on_status(self, msg: DiagnosticArray) -> None:
         """Follow the model that the planner adopts, between motions."""
@@ -158,12 +165,12 @@ class TrackerNode(GuardedNode):
 
     def _on_elder(self) -> None:
         """Leave the arm to the tracker that was started before."""
-        self._send(self._tracker.drop(self._now(), ELDER))
+        self._send(self._tracker.drop(self._present(), ELDER))
 
     def _on_rival(self) -> None:
         """Let go of an arm that somebody else moves, too."""
         self._tracker.release(
-            self._now(), 'another node sends efforts, too; the effort goes to zero'
+            self._present(), 'another node sends efforts, too; the effort goes to zero'
         )
 
     def _on_health(self) -> None:
@@ -183,7 +190,7 @@ class TrackerNode(GuardedNode):
 
     def _on_release(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Let the arm go."""
-        self._tracker.release(self._now())
+        self._tracker.release(self._present())
         response.success, response.message = True, 'the effort goes to zero; idle until a command'
         return response
 

@@ -55,6 +55,7 @@ class Arm:
     sent: list = field(default_factory=list)
     begin: float = 0.0
     goal: float = 0.0
+    ahead: float = 0.0
 
     def start(self, **settings):
         """Start a tracker, which idles until a command; return the arm."""
@@ -69,8 +70,9 @@ class Arm:
         return self
 
     def now(self):
-        """Return the time of the tracker's clock [s]."""
-        return self.time if self.is_simulated else stamps.now(self.graph.probe.get_clock())
+        """Return the time by the stamps of joint states, `ahead` of the tracker's clock [s]."""
+        now = self.time if self.is_simulated else stamps.now(self.graph.probe.get_clock())
+        return now + self.ahead
 
     def pose(self, time):
         """Return the planned position of joint 1 [rad] and its velocity [rad/s]."""
@@ -159,6 +161,17 @@ class Arm:
         assert len(self.errors()) == 1
 
 
+@pytest.fixture
+def arm_ahead(graph):
+    """Return an arm in the midst of a motion, whose clock is half a second ahead."""
+    arm = Arm(graph, is_simulated=True, ahead=0.5)
+    arm.start()
+    arm.command()
+    arm.move_into()
+    assert arm.sent[-1].data[0]
+    return arm
+
+
 @pytest.fixture(params=[True, False], ids=['simulated clock', 'system clock'])
 def arm(request, graph):
     """Return an arm by either clock."""
@@ -171,6 +184,22 @@ def test_joint_states_that_stop_end_the_motion(arm):
     arm.move_into()
     arm.assert_let_go('joint sample is', is_silent=True)
     arm.assert_obeys()
+
+
+def test_joint_states_of_a_clock_ahead_that_stop_end_the_motion_as_soon(arm_ahead):
+    begin = arm_ahead.time
+    arm_ahead.assert_let_go('joint sample is', is_silent=True)
+    assert arm_ahead.time - begin < 0.6  # timeout and ramp are 0.3
+
+
+def test_an_arm_of_a_clock_ahead_is_let_go_along_the_ramp(arm_ahead):
+    last, count = arm_ahead.sent[-1].data[0], len(arm_ahead.sent)
+    assert arm_ahead.graph.call(Trigger, '/flat_tracker/release').success
+    arm_ahead.graph.expect(arm_ahead.is_quiet, 'silence')
+    shares = np.array([effort.data[0] for effort in arm_ahead.sent[count:]]) / last
+    assert (np.diff(shares) <= 0.0).all()
+    assert shares[-1] == 0.0
+    assert ((shares > 0.0) & (shares < 0.8)).sum() >= 3
 
 
 def test_a_joint_that_jumps_ends_the_motion(arm):
