@@ -33,7 +33,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
+from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked, UncertifiedPlan
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS, SERIES_LENGTH
 from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
 from flat_planner_ros.core.motion_law.certificate import (
@@ -43,7 +43,7 @@ from flat_planner_ros.core.motion_law.certificate import (
     relative_sum,
     UNIT_ENDS,
 )
-from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, SummedLaw
+from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, Sum, SummedLaw
 from flat_planner_ros.core.motion_law.roots import Cluster, Spectrum
 from flat_planner_ros.core.motion_law.series_basis import (
     FASTEST,
@@ -53,7 +53,7 @@ from flat_planner_ros.core.motion_law.series_basis import (
     terms_for,
 )
 from flat_planner_ros.core.motion_law.series_sum import SeriesSum
-from flat_planner_ros.core.motion_law.term_sum import ascending_powers, term_sum
+from flat_planner_ros.core.motion_law.term_sum import ascending_powers, CHUNK, term_sum, TermSum
 from flat_planner_ros.core.motion_law.terms import Term
 import numpy as np
 
@@ -67,6 +67,12 @@ differs for equal numbers of two arms only where such an error crosses a multipl
 
 SAME = 2.0**-49
 """Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
+
+LONG = 2 * CHUNK
+"""Most samples that a series gives sooner than exponentials do."""
+
+SAME_LAW = 1e-12
+"""Residuals of a law found by its roots up to which it is the one found as a series [-]."""
 
 UNITS_KEPT = 64
 """Unit motions in the cache; the one unused for longest makes room."""
@@ -242,11 +248,26 @@ class UnitMotion:
             Their factors, shape (7,).
 
         """
-        self.law.total.fill_odd_grid(table, rates)
+        total = self.law.total if table.shape[1] <= LONG else self._in_blocks
+        total.fill_odd_grid(table, rates)
         table[1:CONDITIONS, 0] = 0.0
         table[1:CONDITIONS, -1] = 0.0
         table[0, 0] = -0.5 * rates[0]
         table[0, -1] = 0.5 * rates[0]
+
+    @cached_property
+    def _in_blocks(self) -> Sum:
+        """Return the law by its roots, if they are apart: a few exponentials make a long table."""
+        if not isinstance(self.law.total, SeriesSum):
+            return self.law.total
+        try:
+            found = by_roots(self.coefficients)
+        except UncertifiedPlan:
+            return self.law.total
+        total = found.law.total
+        is_exact = max(found.boundary_residual, found.optimality_residual) <= SAME_LAW
+        is_apart = isinstance(total, TermSum) and not total.others
+        return total if is_exact and is_apart else self.law.total
 
     def mean(self, rows: FloatArray) -> Mean:
         """

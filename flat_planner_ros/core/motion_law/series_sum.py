@@ -75,10 +75,12 @@ class SeriesSum:
         x = 0.5 * (distances[0] - distances[1])
         size = series.shape[1]
         if FEW <= len(x) <= CHUNK:
-            values = _kept_values(x.tobytes(), size)
-        else:
-            values = chebyshev_values(x, size)
-        result: FloatArray = series[: order + 1] @ values
+            sums: FloatArray = series[: order + 1] @ _kept_values(x.tobytes(), size)
+            return sums
+        result = np.empty((order + 1, len(x)))
+        for start in range(0, len(x), CHUNK):
+            part = slice(start, start + CHUNK)
+            np.matmul(series[: order + 1], chebyshev_values(x[part], size), out=result[:, part])
         return result
 
     def fill_odd_grid(self, table: FloatArray, scales: FloatArray) -> None:

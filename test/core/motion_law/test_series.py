@@ -17,7 +17,7 @@
 from equations import equation_of_speed
 from flat_planner_ros.core.motion_law.certificate import relative_sum
 from flat_planner_ros.core.motion_law.chebyshev_series import chebyshev_values, from_legendre
-from flat_planner_ros.core.motion_law.extremal import by_roots, unit_motion
+from flat_planner_ros.core.motion_law.extremal import by_roots, LONG, unit_motion
 from flat_planner_ros.core.motion_law.legendre_series import integration
 from flat_planner_ros.core.motion_law.series_basis import probed, series_basis, solved, TERMS
 from flat_planner_ros.core.motion_law.series_sum import SeriesSum
@@ -152,3 +152,30 @@ def test_the_residual_is_that_of_the_equation_six_times_integrated():
     assert float(relative_sum(equation[1:], probed(amplitudes).parts)) <= 1e-13
     other = equation * (1.0 + 1e-6 * np.arange(7.0))
     assert 1e-8 < float(relative_sum(other[1:], probed(amplitudes).parts)) < 1e-5
+
+
+@pytest.mark.parametrize('speed', [0.0, 1.5, 8.0, 25.0, 50.0])
+def test_a_long_table_is_the_law_at_its_times(speed):
+    """By exponentials, where roots are apart, or in parts."""
+    rng = np.random.default_rng(int(speed))
+    for _ in range(3):
+        equation = equation_of_speed(rng, speed) if speed else np.eye(7)[6]
+        unit = unit_motion(equation)
+        intervals = 2 * LONG + 3
+        table = np.empty((7, intervals + 1))
+        unit.fill_grid(table, np.ones(7))
+        some = np.array([0, 1, 77, 2050, intervals // 2, LONG, intervals - 1, intervals])
+        after_start = 2.0 * some / intervals
+        expected = unit.jet(after_start, 2.0 - after_start)
+        error = np.abs(table[:, some] - expected) / unit.peaks[:, None]
+        assert error.max() <= 1e-11
+
+
+def test_many_times_are_taken_in_parts():
+    unit = unit_motion(equation_of_speed(np.random.default_rng(1), 25.0))
+    after_start = np.linspace(0.0, 2.0, LONG + 5)
+    found = unit.jet(after_start, 2.0 - after_start)
+    for part in (slice(0, 30), slice(LONG // 2 - 20, LONG // 2 + 20), slice(-30, None)):
+        expected = unit.jet(after_start[part], 2.0 - after_start[part])
+        error = np.abs(found[:, part] - expected) / unit.peaks[:, None]
+        assert error.max() <= 1e-14
