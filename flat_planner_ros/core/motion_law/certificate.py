@@ -15,6 +15,7 @@
 """How well laws from rest to rest over one unit of distance meet their ends and equation."""
 
 from functools import cache
+from typing import NamedTuple
 
 from flat_planner_ros.core.arm import FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
@@ -26,6 +27,9 @@ PROBES = 8
 
 PROBE_DEPTH = 36
 """Halvings of the distance to the start at which a law is certified."""
+
+SAME = 2.0**-49
+"""Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
 
 UNIT_ENDS = np.multiply.outer(np.eye(CONDITIONS)[0], [-0.5, 0.5])
 """Derivatives 0 to 5 of a unit motion at its ends, shape (6, 2) [-]."""
@@ -50,30 +54,49 @@ def probes(depth: int = PROBE_DEPTH) -> FloatArray:
     return np.array([times, 2.0 - times])
 
 
-def peaks_of(jets: FloatArray) -> FloatArray:
-    """Return the largest magnitudes of the derivatives 0 to 6 over the last axis, (..., 7)."""
-    largest: FloatArray = np.abs(jets[..., : JET_ORDER + 1, :]).max(axis=-1)
-    return largest
-
-
-def boundary_residual(jets: FloatArray, peaks: FloatArray) -> FloatArray:
+class Quality(NamedTuple):
     """
-    Return (31) of docs/derivation.md for unit motions.
+    Of unit motions, or of one.
+
+    Attributes
+    ----------
+    boundary_residual, optimality_residual
+        (31) and (32), or (32a), of docs/derivation.md, the latter at most, for all coefficients
+        that count as equal, shape (...).
+    peaks
+        Largest magnitudes of the derivatives 0 to 6 at the times of the certificate, (..., 7).
+
+    """
+
+    boundary_residual: FloatArray
+    optimality_residual: FloatArray
+    peaks: FloatArray
+
+
+def quality(coefficients: FloatArray, jets: FloatArray, parts: FloatArray) -> Quality:
+    """
+    Return how well unit motions meet their ends and equations.
 
     Parameters
     ----------
+    coefficients
+        a_0 ... a_6 of their equations, shape (..., 7).
     jets
-        Derivatives from 0 on at `probes`, shape (..., orders, m).
-    peaks
-        `peaks_of` them.
+        Derivatives from 0 on, the sixth among them, at `probes`, shape (..., orders, m).
+    parts
+        What adds up to zero there with the factors a_1 ... a_6, shape (..., 6, m).
 
     """
+    peaks = np.abs(jets[..., : JET_ORDER + 1, :]).max(axis=-1)
     last = jets.shape[-1] - 1
     # Relative to the start, as the value's own peak is the distance.
     sizes = peaks[..., :CONDITIONS] + UNIT_ENDS[:, 1]
     miss = np.abs(jets[..., :CONDITIONS, ::last] - UNIT_ENDS) / sizes[..., None]
-    worst: FloatArray = miss.max(axis=(-2, -1))
-    return worst
+    return Quality(
+        boundary_residual=miss.max(axis=(-2, -1)),
+        optimality_residual=relative_sum(coefficients[..., 1:], parts) + SAME,
+        peaks=peaks,
+    )
 
 
 def relative_sum(factors: FloatArray, terms: FloatArray) -> FloatArray:

@@ -37,10 +37,11 @@ from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked, Uncertif
 from flat_planner_ros.core.motion_law.basis import ALTERNATING, CONDITIONS, SERIES_LENGTH
 from flat_planner_ros.core.motion_law.boundary_solver import boundary_solver, BoundarySolver
 from flat_planner_ros.core.motion_law.certificate import (
-    boundary_residual,
-    peaks_of,
     probes,
+    Quality,
+    quality,
     relative_sum,
+    SAME,
     UNIT_ENDS,
 )
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER, Sum, SummedLaw
@@ -64,9 +65,6 @@ Leading bits of the normalised coefficients under which a unit motion is kept.
 Coefficients are computed with errors of a few units in their last, 53rd bit. What is left of them
 differs for equal numbers of two arms only where such an error crosses a multiple of 2^-48.
 """
-
-SAME = 2.0**-49
-"""Relative difference up to which coefficients count as equal; at most this adds to (32) [-]."""
 
 LONG = 2 * CHUNK
 """Most samples that a series gives sooner than exponentials do."""
@@ -342,34 +340,33 @@ def _as_series(coefficients: FloatArray, speed: float) -> UnitMotion:
     terms = terms_for(speed)
     amplitudes, cost = solved(coefficients, terms)
     total = SeriesSum(coefficients=coefficients, amplitudes=amplitudes)
-    jet, parts = probed(amplitudes)
-    peaks = peaks_of(jet)
-    return UnitMotion(
-        coefficients=coefficients,
-        law=SummedLaw(duration=2.0, total=total),
-        rates=np.array([complex(speed)]),
-        boundary_residual=float(boundary_residual(jet, peaks)),
-        optimality_residual=float(relative_sum(coefficients[1:], parts)) + SAME,
-        costate=float(cost),
-        peaks=peaks,
-    )
+    found = quality(coefficients, *probed(amplitudes))
+    return _unit(coefficients, total, np.array([complex(speed)]), float(cost), found)
 
 
 def by_roots(coefficients: FloatArray, clusters: Clusters | None = None) -> UnitMotion:
     """Return the unit motion of an equation as a sum of exponentials, as `unit_motion`."""
-    found = Spectrum(coefficients).clusters() if clusters is None else clusters()
-    solver = BoundarySolver(found, -1.0)
+    solver = BoundarySolver(
+        Spectrum(coefficients).clusters() if clusters is None else clusters(), -1.0
+    )
     total = solver.total(UNIT_ENDS[:, 1])
     jet = total.at(probes(), 2 * CONDITIONS, _powers_at_probes())
-    peaks = peaks_of(jet)
+    cost = float(costate(coefficients, jet[:, -2]))
+    return _unit(coefficients, total, solver.rates, cost, quality(coefficients, jet, jet[2::2]))
+
+
+def _unit(
+    coefficients: FloatArray, total: Sum, rates: ComplexArray, cost: float, found: Quality
+) -> UnitMotion:
+    """Return a unit motion with its certificate."""
     return UnitMotion(
         coefficients=coefficients,
         law=SummedLaw(duration=2.0, total=total),
-        rates=solver.rates,
-        boundary_residual=float(boundary_residual(jet, peaks)),
-        optimality_residual=stationarity_residual(coefficients, jet) + SAME,
-        costate=float(costate(coefficients, jet[:, -2])),
-        peaks=peaks,
+        rates=rates,
+        boundary_residual=float(found.boundary_residual),
+        optimality_residual=float(found.optimality_residual),
+        costate=cost,
+        peaks=found.peaks,
     )
 
 

@@ -40,7 +40,6 @@ FASTEST = max(TERMS.values())
 PROBE_DEPTH = 8
 """Halvings of the distance to the start at which a series is certified: it has no thin layers."""
 
-
 _EXPONENTS = 1.0 / (SOLUTIONS - 2.0 * np.arange(CONDITIONS))
 
 LOW_DEGREES = np.arange(1, CONDITIONS, 2)

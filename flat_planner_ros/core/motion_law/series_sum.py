@@ -27,7 +27,7 @@ from flat_planner_ros.core.motion_law.series_basis import (
     series_basis,
     TERMS,
 )
-from flat_planner_ros.core.motion_law.term_sum import CHUNK, FEW, grid_blocks
+from flat_planner_ros.core.motion_law.term_sum import CHUNK, FEW, grid_blocks, write_mirrored
 import numpy as np
 
 GRIDS_KEPT = 4
@@ -55,22 +55,7 @@ class SeriesSum:
     amplitudes: FloatArray
 
     def at(self, distances: FloatArray, order: int) -> FloatArray:
-        """
-        Return the law and its derivatives in x, up to the twelfth.
-
-        Parameters
-        ----------
-        distances
-            From the start and from the end, x + 1 and 1 - x, both exact, shape (2, m).
-        order
-            Highest derivative wanted.
-
-        Returns
-        -------
-        FloatArray
-            Row k holds the k-th derivative, shape (order + 1, m).
-
-        """
+        """Return the law and its derivatives in x, up to the twelfth, as `Sum.at`."""
         series = self.series if order <= JET_ORDER else self._all
         x = 0.5 * (distances[0] - distances[1])
         size = series.shape[1]
@@ -84,20 +69,17 @@ class SeriesSum:
         return result
 
     def fill_odd_grid(self, table: FloatArray, scales: FloatArray) -> None:
-        """Write derivatives at even times, both ends included, as `TermSum.fill_odd_grid`."""
+        """Write derivatives at even times, both ends included, as `Sum.fill_odd_grid`."""
         intervals = table.shape[1] - 1
         half = intervals // 2 + 1
         series = scales[:, None] * self.series[: len(table)]
         # Derivatives of even order are odd about the middle.
         odd, even = series[::2, 1::2], series[1::2, ::2]
-        mirrored = table[:, ::-1]
         for start in range(0, half, CHUNK):
-            part = slice(start, min(start + CHUNK, half))
             at_odd, at_even = _grid_values(series.shape[1], intervals, start)
-            np.matmul(odd, at_odd, out=table[::2, part])
-            np.matmul(even, at_even, out=table[1::2, part])
-            np.negative(table[::2, part], out=mirrored[::2, part])
-            mirrored[1::2, part] = table[1::2, part]
+            part = np.empty((len(table), min(CHUNK, half - start)))
+            part[::2], part[1::2] = odd @ at_odd, even @ at_even
+            write_mirrored(table, part, start)
 
     @cached_property
     def series(self) -> FloatArray:

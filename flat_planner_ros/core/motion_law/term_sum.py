@@ -114,17 +114,7 @@ class TermSum:
         return result
 
     def fill_odd_grid(self, table: FloatArray, scales: FloatArray) -> None:
-        """
-        Write an odd sum and its derivatives in x at even times, both ends included.
-
-        Parameters
-        ----------
-        table
-            Its rows take the derivatives in ascending order, shape (orders, m), m > 1.
-        scales
-            Factors of the derivatives, shape (orders,).
-
-        """
+        """Write an odd sum and its derivatives in x at even times, as `Sum.fill_odd_grid`."""
         orders = len(table)
         intervals = table.shape[1] - 1
         half = intervals // 2 + 1
@@ -132,7 +122,6 @@ class TermSum:
         size, places, x = grid_blocks(intervals)
         factors = scales[:, None] * self.factors[:orders]
         amplitudes = factors[:, None, : 4 * count].view(complex)
-        mirrored = table[:, ::-1]
         with np.errstate(under='ignore'):
             tables = self._grid_tables(size, places) if count else None
             for start in range(0, half, CHUNK):
@@ -148,10 +137,7 @@ class TermSum:
                 if self.others:
                     distances = np.array([1.0 + x[start:stop], 1.0 - x[start:stop]])
                     self.add_others(part, distances, scales)
-                # Derivatives of even order are odd about the middle.
-                np.negative(part[::2], out=mirrored[::2, start:stop])
-                mirrored[1::2, start:stop] = part[1::2]
-                table[:, start:stop] = part
+                write_mirrored(table, part, start)
 
     def _grid_tables(self, size: int, places: FloatArray) -> tuple[FloatArray, ComplexArray]:
         """
@@ -400,6 +386,16 @@ def split_parts(fall: ComplexArray, parts: FloatArray) -> None:
     """Write Re and -Im of exponentials, shape (..., m), into a table, shape (..., 2, m)."""
     parts[..., 0, :] = fall.real
     np.negative(fall.imag, out=parts[..., 1, :])
+
+
+def write_mirrored(table: FloatArray, part: FloatArray, start: int) -> None:
+    """Write derivatives of an odd sum, (orders, m), from one of the first times on, and again."""
+    times = slice(start, start + part.shape[1])
+    mirrored = table[:, ::-1]
+    # Derivatives of even order are odd about the middle.
+    np.negative(part[::2], out=mirrored[::2, times])
+    mirrored[1::2, times] = part[1::2]
+    table[:, times] = part
 
 
 @lru_cache(maxsize=BLOCKS_KEPT)

@@ -25,12 +25,7 @@ from typing import NamedTuple
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray
 from flat_planner_ros.core.motion_law.basis import CONDITIONS, SOLUTIONS
-from flat_planner_ros.core.motion_law.certificate import (
-    boundary_residual,
-    peaks_of,
-    relative_sum,
-)
-from flat_planner_ros.core.motion_law.extremal import SAME
+from flat_planner_ros.core.motion_law.certificate import quality
 from flat_planner_ros.core.motion_law.law import JET_ORDER
 from flat_planner_ros.core.motion_law.series_basis import speeds
 import numpy as np
@@ -112,13 +107,10 @@ class Certificates:
             Derivatives 0 to 12 at `probes`, shape (p, 13, m).
 
         """
-        peaks = peaks_of(jets)
         return cls(
             coefficients=coefficients,
-            boundary_residual=boundary_residual(jets, peaks),
-            optimality_residual=relative_sum(coefficients[:, 1:], jets[:, 2::2]) + SAME,
+            **quality(coefficients, jets, jets[:, 2::2])._asdict(),
             costate=-np.einsum('pk,pk->p', coefficients[:, 1:], jets[:, 1:SOLUTIONS:2, -2]),
-            peaks=peaks,
             ends=jets[:, CONDITIONS:SOLUTIONS, -1].copy(),
         )
 

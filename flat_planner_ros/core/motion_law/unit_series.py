@@ -24,12 +24,8 @@ from functools import lru_cache
 
 from flat_planner_ros.core.arm import ComplexArray, FloatArray, locked
 from flat_planner_ros.core.motion_law.basis import CONDITIONS
-from flat_planner_ros.core.motion_law.certificate import (
-    boundary_residual,
-    peaks_of,
-    relative_sum,
-)
-from flat_planner_ros.core.motion_law.extremal import Mean, SAME
+from flat_planner_ros.core.motion_law.certificate import quality
+from flat_planner_ros.core.motion_law.extremal import Mean
 from flat_planner_ros.core.motion_law.law import half_quadrature, JET_ORDER
 from flat_planner_ros.core.motion_law.legendre_series import differentiation, legendre_values
 from flat_planner_ros.core.motion_law.series_basis import (
@@ -160,14 +156,10 @@ class UnitSeries:
 
         """
         amplitudes, cost = solved(coefficients, terms)
-        jets, parts = probed(amplitudes)
-        peaks = peaks_of(jets)
         certificates = Certificates(
             coefficients=coefficients,
-            boundary_residual=boundary_residual(jets, peaks),
-            optimality_residual=relative_sum(coefficients[:, 1:], parts) + SAME,
+            **quality(coefficients, *probed(amplitudes))._asdict(),
             costate=cost,
-            peaks=peaks,
             ends=_ends(coefficients, amplitudes),
         )
         return cls(amplitudes=amplitudes, certificates=certificates)
