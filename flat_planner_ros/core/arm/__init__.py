@@ -60,6 +60,7 @@ from flat_planner_ros.core.arm.samples import (
     SampledMotion,
     SampleTable,
     travel,
+    UNUSABLE,
 )
 from flat_planner_ros.core.arm.sparse_points import sparse_rows
 from flat_planner_ros.core.arm.turns import TurnCounter
@@ -122,6 +123,7 @@ __all__ = [
     'TurnCounter',
     'UncertifiedLoop',
     'UncertifiedPlan',
+    'UNUSABLE',
     'urdf_of',
     'UrdfLimits',
 ]

@@ -33,6 +33,12 @@ JUMP = 0.2
 CURVATURE = 1.5
 """Mean velocity between two samples at most, relative to the larger one at either end [-]."""
 
+UNUSABLE = 1e6
+"""
+Number from which an angle, speed or acceleration is no arm's [rad], [rad/s], [rad/s^2], nor an
+effort [N m]: damaged, or never set.
+"""
+
 UNKNOWN_SPEED = 30.0
 """Speed that a joint may have where its velocity is not measured [rad/s]."""
 
@@ -133,7 +139,8 @@ class JointStateRules:
 def travel(former: JointSample, sample: JointSample) -> FloatArray:
     """Return how far each joint can have moved between two samples, shape (n,) [rad]."""
     speed = np.maximum(_speed(former), _speed(sample))
-    distance: FloatArray = CURVATURE * abs(sample.time - former.time) * speed
+    with np.errstate(over='ignore'):  # infinitely far will do
+        distance: FloatArray = CURVATURE * abs(sample.time - former.time) * speed
     return distance
 
 

@@ -64,7 +64,8 @@ class TurnCounter:
         # Plain numbers: for a few joints an operation on arrays costs more than all of this.
         for now, before in zip(positions, self._last, strict=False):
             if not -pi <= now - before <= pi:  # a NaN, too
-                self._count(sample)
+                with np.errstate(over='ignore'):  # of angles that are none
+                    self._count(sample)
                 break
         else:
             is_first = self._former is None
@@ -82,7 +83,7 @@ class TurnCounter:
         former = self._former
         if former is None:
             return None
-        with np.errstate(invalid='ignore'):  # infinite twice in a row is no step
+        with np.errstate(invalid='ignore', over='ignore'):  # infinite twice in a row is no step
             change = np.diff(samples.positions, axis=0, prepend=former.positions[None])
         if not np.abs(change).max() <= pi:
             return None

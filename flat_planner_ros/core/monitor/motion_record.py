@@ -26,6 +26,7 @@ from flat_planner_ros.core.arm import (
     InvalidRequest,
     SampledMotion,
     SampleTable,
+    UNUSABLE,
 )
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +78,11 @@ class PlannedMotion:
             raise InvalidRequest('times of a motion must be ascending from 0 s or later')
         shape = (times.size, len(names))
         object.__setattr__(self, 'joint_names', names)
-        self._lock('positions', shape, 'rad')
+        self._lock_joints('positions', shape, 'rad')
         if self.velocities is not None:
-            self._lock('velocities', shape, 'rad/s')
+            self._lock_joints('velocities', shape, 'rad/s')
         if self.efforts is not None:
-            self._lock('efforts', shape, 'N m')
+            self._lock_joints('efforts', shape, 'N m')
 
     @property
     def end(self) -> float:
@@ -138,6 +139,12 @@ class PlannedMotion:
         array = checked_array(name, values, unit, shape=shape, error=InvalidRequest)
         object.__setattr__(self, name, array)
         return array
+
+    def _lock_joints(self, name: str, shape: tuple[int, ...], unit: str) -> None:
+        """Lock what joints do, and refuse what none does."""
+        largest = float(np.abs(self._lock(name, shape, unit)).max())
+        if largest > UNUSABLE:
+            raise InvalidRequest(f'{name} of {largest:.3g} {unit} are beyond {UNUSABLE:g} {unit}')
 
     @cached_property
     def _motion(self) -> SampledMotion:

@@ -20,14 +20,12 @@ from flat_planner_ros.core.arm import (
     JUMP,
     SampleTable,
     travel,
+    UNUSABLE,
 )
 from flat_planner_ros.core.monitor.course import DEGREES
 from flat_planner_ros.core.monitor.motion_record import PlannedMotion
 import numpy as np
 from numpy.typing import NDArray
-
-UNUSABLE = 1e6
-"""Angle from which a sample is of no joint [rad]: damaged, or never set."""
 
 
 def check_size(sample: JointSample, motion: PlannedMotion) -> None:

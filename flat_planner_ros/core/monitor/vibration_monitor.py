@@ -24,6 +24,7 @@ from flat_planner_ros.core.arm import (
     JointSample,
     OffsetFilter,
     SampleTable,
+    UNUSABLE,
 )
 from flat_planner_ros.core.monitor.feedback_times import FeedbackTimes
 from flat_planner_ros.core.monitor.motion_record import Measured, PlannedMotion, Residual
@@ -32,7 +33,6 @@ from flat_planner_ros.core.monitor.sample_checks import (
     check_size,
     jump,
     unremarkable,
-    UNUSABLE,
 )
 from flat_planner_ros.core.monitor.settings import MonitorSettings
 from flat_planner_ros.core.monitor.stamp_offset import SampleClock

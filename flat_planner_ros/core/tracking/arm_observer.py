@@ -16,10 +16,9 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, JointSample, PlanarArm
+from flat_planner_ros.core.arm import FloatArray, JointSample, PlanarArm, UNUSABLE
 from flat_planner_ros.core.tracking.chain import last_links, linearised_joint
 from flat_planner_ros.core.tracking.observer import Observer
-from flat_planner_ros.core.tracking.tracked_motion import UNUSABLE
 import numpy as np
 
 

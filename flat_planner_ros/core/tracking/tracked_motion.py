@@ -16,11 +16,8 @@
 
 from typing import NamedTuple
 
-from flat_planner_ros.core.arm import FloatArray, InvalidCommand, SampledMotion
+from flat_planner_ros.core.arm import FloatArray, InvalidCommand, SampledMotion, UNUSABLE
 import numpy as np
-
-UNUSABLE = 1e6
-"""Number from which an angle, speed or acceleration is no arm's [rad], [rad/s], [rad/s^2]."""
 
 
 class Reference(NamedTuple):

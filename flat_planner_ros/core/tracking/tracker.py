@@ -23,12 +23,18 @@ from dataclasses import replace
 from enum import Enum
 from math import inf, pi, remainder, tau
 
-from flat_planner_ros.core.arm import FloatArray, InvalidCommand, JointSample, PlanarArm
+from flat_planner_ros.core.arm import (
+    FloatArray,
+    InvalidCommand,
+    JointSample,
+    PlanarArm,
+    UNUSABLE,
+)
 from flat_planner_ros.core.tracking.arm_observer import Estimate
 from flat_planner_ros.core.tracking.certificate import certify
 from flat_planner_ros.core.tracking.settings import TrackerSettings
 from flat_planner_ros.core.tracking.state_feedback import distance, StateFeedback
-from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion, UNUSABLE
+from flat_planner_ros.core.tracking.tracked_motion import TrackedMotion
 from flat_planner_ros.core.tracking.watches import AgeWatch, GrowthWatch
 import numpy as np
 

@@ -160,3 +160,15 @@ def test_a_pose_may_be_known_of_some_joints_only():
     shown = [[6.2, 6.28], [6.2, 0.001]]
     found = unwrapped(counter, *(sample(0.005 * k, q, [0.0, 0.0]) for k, q in enumerate(shown)))
     assert found == pytest.approx(np.array([[6.2, 6.28 - 2 * pi], [6.2, 0.001]]))
+
+
+@pytest.mark.parametrize('velocity', [None, 1.7e308])
+def test_the_largest_numbers_are_no_turns(velocity):
+    """A damaged message may hold any number: its difference from the next need not be finite."""
+    counter = TurnCounter()
+    angles = [3.1, 1.7e308, -1.7e308, 1.7e308, -3.1]
+    known = None if velocity is None else [velocity]
+    samples = [sample(0.005 * k, [q], known) for k, q in enumerate(angles)]
+    assert unwrapped(counter, *samples)[:, 0].tolist() == angles
+    table = SampleTable(times=np.array([0.03, 0.035]), positions=np.array([[1.7e308], [-1.7e308]]))
+    assert counter.unwrapped_table(table) is None

@@ -595,8 +595,11 @@ def test_a_sample_of_other_joints_is_refused(monitor):
         {'times': np.zeros(51)},
         {'positions': np.zeros((51, 3))},
         {'positions': np.full((51, 2), np.nan)},
+        {'positions': np.full((51, 2), 1.1e6)},
         {'velocities': np.zeros((50, 2))},
+        {'velocities': np.full((51, 2), -1e308)},
         {'efforts': np.zeros(51)},
+        {'efforts': np.full((51, 2), 1.1e6)},
     ],
 )
 def test_what_is_no_motion_is_refused(changes):

@@ -281,6 +281,7 @@ def test_random_joint_states_harm_no_node(graph):
         graph.spin_until(lambda: True)
 
     send()
+    assert not graph.logged('internal error')
     assert (goals.node._session.track(0.0).efforts == track.efforts).all()
     _still_serves(graph, goals, monitor)
 
@@ -308,6 +309,7 @@ def test_random_trajectories_and_efforts_never_drive_the_plant_mad(graph):
     for received in states:
         received.clear()
         graph.expect(lambda received=received: received, 'the plants go on')
+    assert not graph.logged('internal error')
 
 
 def test_random_messages_never_make_a_tracker_send_what_it_must_not(graph):
