@@ -88,7 +88,7 @@ class Tracker:
         self._observer = self._feedback.observer
         self._motion: TrackedMotion | None = None
         self._next: TrackedMotion | None = None
-        self._heard, self._sent, self._watched = -inf, -inf, -inf
+        self._now, self._heard, self._sent = -inf, -inf, -inf
         self._efforts = self._last = np.zeros(arm.n - 1)
         self._released = -inf
         self._clipped_since = inf
@@ -132,7 +132,7 @@ class Tracker:
         self._observer.continue_from(other._observer)
         self._motion, self._next, self.phase = other._motion, other._next, other.phase
         self._heard, self._sent, self._released = other._heard, other._sent, other._released
-        self._watched = other._watched
+        self._now = other._now
         self._efforts, self._last = other._efforts, other._last
         self._clipped_since, self.error = other._clipped_since, other.error
         self._fault, self.ages = other._fault, other.ages
@@ -176,6 +176,7 @@ class Tracker:
             Shape (n-1,) [N m], to act the loop's delay from now on; None if nothing is to be sent.
 
         """
+        self._look_at_clock(now)
         if not (np.abs(sample.positions) < UNUSABLE).all():
             is_finite = bool(np.isfinite(sample.positions).all())
             what = f'beyond {UNUSABLE:g} rad' if is_finite else 'not finite'
@@ -188,10 +189,7 @@ class Tracker:
 
     def watch(self, now: float) -> FloatArray | None:
         """Return the efforts to apply if no sample has come lately, None if there are none."""
-        # Its own times are compared: those of samples may be another computer's.
-        if now < self._watched - self._settings.timeout:
-            self._go_back(now, f'the clock was set back by {self._watched - now:.3g} s')
-        self._watched = now
+        self._look_at_clock(now)
         if now - self._heard <= self._settings.timeout and self.phase is not Phase.RELEASING:
             return None
         return self._act(now)
@@ -308,6 +306,13 @@ class Tracker:
             return
         self._efforts = self._last * min(1.0, left / self._settings.ramp)
         self._observer.note_efforts(time, self._efforts)
+
+    def _look_at_clock(self, now: float) -> None:
+        """Notice that the clock was set back."""
+        # Its own times are compared: those of samples may be another computer's.
+        if now < self._now - self._settings.timeout:
+            self._go_back(now, f'the clock was set back by {self._now - now:.3g} s')
+        self._now = now
 
     def _go_back(self, now: float, reason: str) -> None:
         """Release the arm by a clock that was set back; efforts do not wait for its old times."""

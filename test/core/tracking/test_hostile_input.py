@@ -20,7 +20,7 @@ from core.conftest import ARM
 from core.tracking.closed_loop import motion_of, samples_of
 from flat_planner_ros.core.arm import FlatPlannerError, JointSample
 from flat_planner_ros.core.tracking import Phase, TrackedMotion, Tracker, TrackerSettings
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 from random_cases import cases
@@ -133,6 +133,7 @@ class Player:
 
 @settings(max_examples=cases(2000, 20), deadline=None, derandomize=True, database=None)
 @given(st.lists(events, max_size=30))
+@example([('follow', 0.0), ('true', 1), ('sample', (0.0, 1e6), None, -1e9, 0.0)])
 def test_no_exception_and_no_effort_beyond_the_limit(story):
     player = Player()
     for name, *given_ in story:
